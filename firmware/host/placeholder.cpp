@@ -1,0 +1,1 @@
+#include "firmware/loop_output.hpp"

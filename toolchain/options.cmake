@@ -1,0 +1,34 @@
+# Warnings and floating-point options, as interface targets every folder links.
+
+set(CMAKE_CXX_STANDARD 23)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE RelWithDebInfo)
+endif()
+set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g")
+set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
+
+option(CUTFORCE_SANITIZE "AddressSanitizer and UndefinedBehaviorSanitizer" OFF)
+
+add_library(cutforce_options INTERFACE)
+target_include_directories(cutforce_options INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_options(cutforce_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wshadow
+  -Wold-style-cast -Wswitch-enum -Werror
+  # The same bits on every target: no fused multiply-add, no reassociation.
+  -ffp-contract=off -fno-math-errno)
+target_compile_definitions(cutforce_options INTERFACE
+  EIGEN_DONT_VECTORIZE EIGEN_MAX_ALIGN_BYTES=8 EIGEN_NO_MALLOC)
+if(CUTFORCE_SANITIZE)
+  target_compile_options(cutforce_options INTERFACE
+    -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(cutforce_options INTERFACE -fsanitize=address,undefined)
+endif()
+
+# The core throws nothing and knows no types at run time, on any machine.
+add_library(cutforce_core_options INTERFACE)
+target_link_libraries(cutforce_core_options INTERFACE cutforce_options)
+target_compile_options(cutforce_core_options INTERFACE
+  -fno-exceptions -fno-rtti -fno-threadsafe-statics)
