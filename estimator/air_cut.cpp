@@ -13,6 +13,9 @@ constexpr float kShortestWait_s = 0.06F;
 constexpr float kNoiseWait_s = 0.15F;
 constexpr float kNoisySpeed_rad_s = 0.2F;
 constexpr float kTorqueFloor_ratio = 1e-3F;
+constexpr float kTareSigma_ratio = 0.02F;
+constexpr float kYoungTare_s = 0.06F;
+constexpr float kLargestThreshold_ratio = 0.06F;
 constexpr float kReturn_ratio = 0.05F;     // believed as idle after a change of speed
 
 float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
@@ -51,10 +54,10 @@ auto AirCut::decide(const Input& input, float y_nm, float slope_nm) const noexce
   const float rated = config_.rated_torque_nm;
   float threshold = config_.contact_ratio * rated;
   const float noise = 4.0F * input.sigma_nm;
-  if (noise > threshold) threshold = noise;
   const float ripple = 4.0F * std::sqrt(state_.variance_nm2);
-  const float ripple_limit = 0.06F * rated;
-  if (state_.has_tare != 0 && ripple > threshold) threshold = ripple < ripple_limit ? ripple : ripple_limit;
+  const float scatter = ripple > noise && state_.has_tare != 0 ? ripple : noise;
+  const float limit = kLargestThreshold_ratio * rated;
+  if (scatter > threshold) threshold = scatter < limit ? scatter : limit;
 
   const float net = y_nm - state_.tare_nm;
   const float noisy = input.speed_sigma_rad_s < kNoisySpeed_rad_s
@@ -69,6 +72,7 @@ auto AirCut::decide(const Input& input, float y_nm, float slope_nm) const noexce
   switch (state_.phase) {
     case Phase::kIdle: {
       if (magnitude(net) <= threshold) return Phase::kIdle;
+      if (state_.idle_s < kYoungTare_s) return Phase::kUnsteady;
       const float friction = y_nm - net;  // b, about the torque of the air cut
       const bool speeding_up = slope_nm > kUnsteady_ratio * rated;
       const bool braking = input.airgap_torque_nm < friction - threshold;
@@ -83,6 +87,8 @@ auto AirCut::decide(const Input& input, float y_nm, float slope_nm) const noexce
   }
   if (!waited) return Phase::kUnsteady;
   if (state_.has_tare == 0) {
+    // Not before the load torque is known well enough to be a tare.
+    if (!(input.sigma_nm < kTareSigma_ratio * rated)) return Phase::kUnsteady;
     return magnitude(y_nm) < config_.friction_limit_ratio * rated ? Phase::kIdle : Phase::kCut;
   }
   return magnitude(net) < kReturn_ratio * rated && state_.was_cut == 0 ? Phase::kIdle : Phase::kCut;
@@ -121,6 +127,7 @@ auto AirCut::step(const Input& input) noexcept -> Output {
     const Phase now = decide(input, y, slope_nm);
     if (before == Phase::kIdle && now != Phase::kIdle) {
       if (state_.has_tare != 0) state_.tare_nm = state_.snapshots_nm[3];
+      if (state_.idle_s < kYoungTare_s && now == Phase::kUnsteady) state_.has_tare = 0;
       state_.idle_s = 0.0F;
     }
     if (now == Phase::kCut) state_.was_cut = 1;

@@ -14,12 +14,15 @@ constexpr float kLock_s = 0.03F;
 constexpr float kNoiseTime_s = 0.5F;
 constexpr float kExplainTime_s = 0.1F;
 constexpr float kOutlier_ratio = 9.0F;
-constexpr float kDifferenceTime_s = 0.2F;
+constexpr std::uint32_t kHistory = 4;       // ticks until the differences are filled
+constexpr std::uint32_t kBlock = 50;        // ticks
+constexpr std::uint32_t kMostBlocks = 16;
+constexpr std::uint32_t kMostRefused = 10;
+constexpr float kLoud_ratio = 2.5F;
+constexpr float kQuiet_ratio = 0.4F;
 constexpr float kSpeedFloor_rad_s = 3e-5F;  // rounding of a recorded speed
-constexpr float kFluxWander_ratio = 0.05F;  // the flux angle always wanders a little
 constexpr float kFluxFloor_rad_s = 0.01F;
 constexpr float kColour_s = 0.3F;
-constexpr float kShortestNoiseMeasure_s = 0.05F;
 
 float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
 
@@ -77,8 +80,17 @@ void FusedObserver::recalibrated(SpaceVector voltage_offset_v, SpaceVector curre
   own_.rotor_flux_v_s = {psi.alpha - l * i.alpha, psi.beta - l * i.beta};
   own_.current_a = i;
   own_.noise.idle_s = 0.0F;
+  const Noise& n = own_.noise;
+  const float rated = config_.filter.rated_torque_nm;
+  if (own_.calibrated == 0) {
+    // What the filter has seen so far carries the ripple of the offsets: begin anew from the means.
+    const float sigma = std::sqrt(n.filter.speed_variance + n.filter.angle_variance);
+    filter_.start(n.explained_rad_s, sigma + kSpeedFloor_rad_s, n.slow_torque_nm, 0.03F * rated);
+  } else {
+    filter_.loosen(0.01F * rated);
+  }
   own_.calibrated = 1;
-  filter_.loosen(0.02F * config_.filter.rated_torque_nm);
+  own_.noise.after_restart = 0;
   air_.restart_average();
 }
 
@@ -127,10 +139,10 @@ void FusedObserver::measure_noise(const LoadTorqueFilter::Input& input, float ce
   if (!valid) return;
   const float g = h / config_.filter.inertia_kg_m2;
   n.idle_s = idle ? n.idle_s + h : 0.0F;
-  if (n.seen_s <= 0.0F || (idle && n.idle_s <= h)) {
+  if (n.after_restart == 0 || (idle && n.idle_s <= h)) {
     n.explained_rad_s = speed_rad_s;
     n.slow_torque_nm = torque_nm;
-    n.seen_s = 0.0F;
+    n.after_restart = 0;
   }
   n.slow_torque_nm += (torque_nm - n.slow_torque_nm) * h / kExplainTime_s;
   n.explained_rad_s += g * (torque_nm - n.slow_torque_nm);
@@ -143,19 +155,16 @@ void FusedObserver::measure_noise(const LoadTorqueFilter::Input& input, float ce
   const float d2 = unexplained - 2.0F * n.unexplained_nm[0] + n.unexplained_nm[1];
   const float change = residual - n.residual_rad_s;
 
-  n.seen_s += h;
-  if (n.seen_s > 5.0F * h && (idle || n.idle_measured == 0)) {
-    const float longest_s = idle ? kNoiseTime_s : kDifferenceTime_s;
-    const float time_s = n.seen_s < longest_s ? n.seen_s : longest_s;
-    const float share = h / time_s;
-    // A change that is far out (a calibration, a contact not yet seen) must not count as noise.
-    const float bound = n.seen_s > 20.0F * h ? kOutlier_ratio * n.e0 : change * change;
-    const float squared = change * change;
-    const float shrink = squared > bound ? bound / squared : 1.0F;
-    n.e0 += share * (shrink * squared - n.e0);
-    n.e1 += share * (shrink * change * n.step_rad_s - n.e1);
-    n.third_torque += share * (d3 * d3 * (1.0F / 20.0F) - n.third_torque);
-    n.second_unexplained += share * (d2 * d2 * (1.0F / 6.0F) - n.second_unexplained);
+  ++n.after_restart;
+  if (n.after_restart > kHistory) {
+    n.block.e0 += change * change;
+    n.block.e1 += change * n.step_rad_s;
+    n.block.third_nm2 += d3 * d3 * (1.0F / 20.0F);
+    n.block.second_nm2 += d2 * d2 * (1.0F / 6.0F);
+    if (++n.filled == kBlock) {
+      close_block(idle || n.idle_measured == 0);
+      if (idle && own_.calibrated != 0) n.idle_measured = 1;
+    }
   }
   n.step_rad_s = change;
   n.residual_rad_s = residual;
@@ -163,32 +172,74 @@ void FusedObserver::measure_noise(const LoadTorqueFilter::Input& input, float ce
   n.last_speed_rad_s = speed_rad_s;
   n.torque_nm = {torque_nm, n.torque_nm[0], n.torque_nm[1]};
   n.unexplained_nm = {unexplained, n.unexplained_nm[0]};
-  if (idle && n.idle_s > kShortestNoiseMeasure_s && own_.calibrated != 0) n.idle_measured = 1;
-  if (n.seen_s < (n.measured != 0 ? 0.1F : 0.02F) || (!idle && n.idle_measured != 0)) return;
+  if (n.blocks > 0) set_noise(residual, h);
+}
 
-  // Of the changes: white noise gives E0 = 2 W, E1 = -W; angle noise 6 A, -4 A.
-  float angle = -0.5F * n.e0 - n.e1;
-  if (angle > n.e0 * (1.0F / 6.0F)) angle = n.e0 * (1.0F / 6.0F);
-  if (!(angle > 0.1F * n.e0)) angle = 0.0F;  // within the scatter of e1
-  float white = 0.5F * n.e0 - 3.0F * angle;
-  float floor = kSpeedFloor_rad_s * kSpeedFloor_rad_s;
-  if (config_.sensorless) floor += kFluxWander_ratio * n.e0 + kFluxFloor_rad_s * kFluxFloor_rad_s;
-  if (!(white > floor)) white = floor;
-  if (n.idle_s > kColour_s) {
-    // What is left of slow, coloured noise counts as white, else the filter believes it.
-    const float share = h / kNoiseTime_s;
-    const float known = white + 2.0F * angle;
-    if (n.idle_s - h <= kColour_s) n.c0 = known;
-    const float squared = residual * residual;
-    const float bound = kOutlier_ratio * n.c0;
-    n.c0 += share * ((squared < bound ? squared : bound) - n.c0);
-    if (n.c0 > known) white += n.c0 - known;
+// A block much quieter than the mean shows that the mean held a transient; a much louder one is a
+// transient itself, unless it goes on.
+void FusedObserver::close_block(bool of_speed) noexcept {
+  Noise& n = own_.noise;
+  constexpr float kShare = 1.0F / static_cast<float>(kBlock);
+  const Differences d{.e0 = n.block.e0 * kShare,
+                      .e1 = n.block.e1 * kShare,
+                      .third_nm2 = n.block.third_nm2 * kShare,
+                      .second_nm2 = n.block.second_nm2 * kShare};
+  n.block = {};
+  n.filled = 0;
+  if (!of_speed) {
+    // In the cut only the torque's noise is followed: it grows with the current.
+    const float share = 1.0F / static_cast<float>(kMostBlocks);
+    const float third_limit = kLoud_ratio * n.mean.third_nm2;
+    const float second_limit = kLoud_ratio * n.mean.second_nm2;
+    n.mean.third_nm2 += share * ((d.third_nm2 < third_limit ? d.third_nm2 : third_limit) - n.mean.third_nm2);
+    n.mean.second_nm2 += share * ((d.second_nm2 < second_limit ? d.second_nm2 : second_limit) - n.mean.second_nm2);
+    return;
   }
-  n.measured = 1;
+  if (n.blocks > 0 && d.e0 > kLoud_ratio * n.mean.e0 && ++n.refused < kMostRefused) return;
+  const bool anew = n.blocks == 0 || n.refused >= kMostRefused || d.e0 < kQuiet_ratio * n.mean.e0;
+  n.refused = 0;
+  if (anew) {
+    n.mean = d;
+    n.blocks = 1;
+    return;
+  }
+  if (n.blocks < kMostBlocks) ++n.blocks;
+  const float share = 1.0F / static_cast<float>(n.blocks);
+  n.mean.e0 += share * (d.e0 - n.mean.e0);
+  n.mean.e1 += share * (d.e1 - n.mean.e1);
+  n.mean.third_nm2 += share * (d.third_nm2 - n.mean.third_nm2);
+  n.mean.second_nm2 += share * (d.second_nm2 - n.mean.second_nm2);
+}
+
+// Of the changes: white noise gives E0 = 2 W, E1 = -W; angle noise 6 A, -4 A.
+void FusedObserver::set_noise(float residual_rad_s, float duration_s) noexcept {
+  Noise& n = own_.noise;
+  float samples = duration_s / config_.flux.sample_period_s;
+  if (!(samples > 1.0F)) samples = 1.0F;
+  float angle = -0.5F * n.mean.e0 - n.mean.e1;
+  const float most = n.mean.e0 * (1.0F / 6.0F);
+  if (angle > most) angle = most;
+  // Within the scatter of e1, or the mixture that noise makes of the flux angle, it is white.
+  if (!(angle > 0.1F * n.mean.e0) || config_.sensorless) angle = 0.0F;
+  float white = 0.5F * n.mean.e0 - 3.0F * angle;
+  float floor = kSpeedFloor_rad_s * kSpeedFloor_rad_s;
+  if (config_.sensorless) floor += kFluxFloor_rad_s * kFluxFloor_rad_s;
+  if (!(white > floor)) white = floor;
+  // What is left of slow, coloured noise counts as white, else the filter believes it.
+  const float known = white + 2.0F * angle;
+  if (n.idle_s > kColour_s) {
+    if (!(n.c0 > 0.0F)) n.c0 = known;
+    const float squared = residual_rad_s * residual_rad_s;
+    const float bound = kOutlier_ratio * n.c0;
+    n.c0 += duration_s / kNoiseTime_s * ((squared < bound ? squared : bound) - n.c0);
+  }
+  if (n.c0 > known) white += n.c0 - known;
   n.filter.speed_variance = white;
   n.filter.angle_variance = angle;
-  n.filter.torque_variance =
-      n.third_torque < n.second_unexplained ? n.third_torque : n.second_unexplained;
+  // The trapezoid shares each sample at a tick's end between two ticks; differences hide that.
+  const float third = n.mean.third_nm2 * samples / (samples - 0.875F);
+  const float second = n.mean.second_nm2 * samples / (samples - 0.833F);
+  n.filter.torque_variance = third < second ? third : second;
 }
 
 auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
@@ -228,17 +279,16 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
   out.valid = locked && (speed_valid || own_.ticks > 0);
   if (!locked) {
     own_.ticks = 0;
-    if (speed_valid) filter_.start(speed, 0.0F, config_.filter.rated_torque_nm);
     out.speed_rad_s = speed;
     static_cast<void>(air_.step({.load_torque_nm = 0.0F, .sigma_nm = 0.0F, .airgap_torque_nm = torque,
                                  .speed_rad_s = speed, .speed_sigma_rad_s = 0.0F, .duration_s = h,
                                  .feed = feed, .calibrated = false, .valid = false}));
     own_.noise.idle_s = 0.0F;
-    own_.noise.seen_s = 0.0F;
+    own_.noise.after_restart = 0;
     out.valid = false;
     return out;
   }
-  if (own_.ticks == 0) filter_.start(speed, torque, config_.filter.rated_torque_nm);
+  if (own_.ticks == 0) filter_.start(speed, 1.0F, torque, config_.filter.rated_torque_nm);
   ++own_.ticks;
 
   const float moment_nm =

@@ -74,6 +74,14 @@ class FusedObserver {
     float duration_s;
   };
 
+  // Mean squares and products that tell the noise apart, (E103).
+  struct Differences {
+    float e0 = 0.0F;        // variance of the change of the speed that the torque leaves unexplained
+    float e1 = 0.0F;        // its covariance from tick to tick
+    float third_nm2 = 0.0F;   // third difference of the torque, /20
+    float second_nm2 = 0.0F;  // second difference of the torque that the speed leaves unexplained, /6
+  };
+
   struct Noise {
     LoadTorqueFilter::Noise filter{};
     std::array<float, 3> torque_nm{};        // last ticks, for differences
@@ -84,14 +92,14 @@ class FusedObserver {
     float last_speed_rad_s = 0.0F;
     float last_moment_nm = 0.0F;
     float slow_torque_nm = 0.0F;
-    float e0 = 0.0F;                         // variance of the changes of the rest
-    float e1 = 0.0F;                         // and their covariance from tick to tick
+    Differences block{};                     // sums of the block of ticks that is being filled
+    Differences mean{};                      // of the blocks that count
     float c0 = 0.0F;                         // variance of the rest in a long idle
-    float third_torque = 0.0F;
-    float second_unexplained = 0.0F;
-    float seen_s = 0.0F;                     // in this average
     float idle_s = 0.0F;
-    std::uint32_t measured = 0;
+    std::uint32_t filled = 0;                // ticks in the block
+    std::uint32_t blocks = 0;                // in the mean, at most kMostBlocks
+    std::uint32_t refused = 0;               // blocks refused in a row
+    std::uint32_t after_restart = 0;         // ticks since the rest began anew
     std::uint32_t idle_measured = 0;
   };
 
@@ -134,6 +142,8 @@ class FusedObserver {
   [[nodiscard]] Rotation rotation(const FluxTorque::Window& window) noexcept;
   void track_frequency(const Rotation& rotation, float duration_s) noexcept;
   void measure_noise(const LoadTorqueFilter::Input& input, float centre_ratio, bool idle) noexcept;
+  void close_block(bool of_speed) noexcept;
+  void set_noise(float residual_rad_s, float duration_s) noexcept;
 
   Config config_;
   FluxTorque flux_;

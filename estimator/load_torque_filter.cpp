@@ -70,11 +70,11 @@ auto LoadTorqueFilter::make(const Config& config) noexcept
   return LoadTorqueFilter{config};
 }
 
-void LoadTorqueFilter::start(float speed_rad_s, float torque_nm, float torque_sigma_nm) noexcept {
-  const float speed_sigma = torque_sigma_nm * config_.tick_s / config_.inertia_kg_m2 + 1e-3F;
+void LoadTorqueFilter::start(float speed_rad_s, float speed_sigma_rad_s, float torque_nm,
+                             float torque_sigma_nm) noexcept {
   for (Model& m : state_.models) {
     m.mean = {0.0F, speed_rad_s, torque_nm};
-    m.covariance = {0.0F, 0.0F, 0.0F, speed_sigma * speed_sigma, 0.0F,
+    m.covariance = {0.0F, 0.0F, 0.0F, speed_sigma_rad_s * speed_sigma_rad_s, 0.0F,
                     torque_sigma_nm * torque_sigma_nm};
   }
   state_.edge_probability = 0.5F;
@@ -86,7 +86,7 @@ void LoadTorqueFilter::loosen(float torque_sigma_nm) noexcept {
 }
 
 auto LoadTorqueFilter::step(const Input& input, const Noise& noise) noexcept -> Output {
-  if (state_.started == 0) start(input.speed_rad_s, input.torque_nm, config_.rated_torque_nm);
+  if (state_.started == 0) start(input.speed_rad_s, 1.0F, input.torque_nm, config_.rated_torque_nm);
 
   auto& [quiet, edge] = state_.models;
   // Mix before the step: each model starts from the weighted mean, (E74).

@@ -85,8 +85,9 @@ class LoadTorqueFilter {
 
   [[nodiscard]] Output step(const Input& input, const Noise& noise) noexcept;
 
-  // Starts both models at this speed and torque, with the given uncertainty of the torque.
-  void start(float speed_rad_s, float torque_nm, float torque_sigma_nm) noexcept;
+  // Starts both models at this speed and torque, with their uncertainties.
+  void start(float speed_rad_s, float speed_sigma_rad_s, float torque_nm,
+             float torque_sigma_nm) noexcept;
 
   // The torque's scale or offset changed: forget by this much.
   void loosen(float torque_sigma_nm) noexcept;
