@@ -10,6 +10,7 @@ constexpr float kUnsteady_ratio = 0.03F;   // of the rated torque, as accelerati
 constexpr float kTareTime_s = 0.3F;
 constexpr float kSnapshot_s = 0.025F;
 constexpr float kShortestWait_s = 0.06F;
+constexpr float kEven_s = 0.02F;
 constexpr float kNoiseWait_s = 0.15F;
 constexpr float kNoisySpeed_rad_s = 0.2F;
 constexpr float kTorqueFloor_ratio = 1e-3F;
@@ -149,7 +150,7 @@ auto AirCut::step(const Input& input) noexcept -> Output {
   const float averaged_s = state_.idle_s > h ? state_.idle_s : h;
   const float samples = (averaged_s < kTareTime_s ? averaged_s : kTareTime_s) / h;
   return {.phase = state_.phase,
-          .steady = state_.even_s > kShortestWait_s,
+          .steady = state_.even_s > kEven_s,
           .net_torque_nm = y - state_.tare_nm,
           .tare_nm = state_.tare_nm,
           .tare_sigma_nm = std::sqrt(state_.variance_nm2 / samples),

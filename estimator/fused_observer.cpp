@@ -11,18 +11,16 @@ constexpr float kTwoPi = 6.28318530718F;
 constexpr float kFrequencyTime_s = 0.015F;
 constexpr float kLowestFrequency_rad_s = kTwoPi * 3.0F;
 constexpr float kLock_s = 0.03F;
-constexpr float kNoiseTime_s = 0.5F;
 constexpr float kExplainTime_s = 0.1F;
-constexpr float kOutlier_ratio = 9.0F;
-constexpr std::uint32_t kHistory = 4;       // ticks until the differences are filled
+constexpr std::uint32_t kHistory = 2 * FusedObserver::kLag;  // ticks until the differences are filled
 constexpr std::uint32_t kBlock = 50;        // ticks
 constexpr std::uint32_t kMostBlocks = 16;
-constexpr std::uint32_t kMostRefused = 10;
 constexpr float kLoud_ratio = 2.5F;
 constexpr float kQuiet_ratio = 0.4F;
 constexpr float kSpeedFloor_rad_s = 3e-5F;  // rounding of a recorded speed
 constexpr float kFluxFloor_rad_s = 0.01F;
-constexpr float kColour_s = 0.3F;
+constexpr float kUncalibrated_ratio = 0.03F;
+constexpr float kColour_ratio = 1.5F;
 
 float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
 
@@ -79,18 +77,15 @@ void FusedObserver::recalibrated(SpaceVector voltage_offset_v, SpaceVector curre
   const float l = config_.leakage_inductance_h;
   own_.rotor_flux_v_s = {psi.alpha - l * i.alpha, psi.beta - l * i.beta};
   own_.current_a = i;
-  own_.noise.idle_s = 0.0F;
-  const Noise& n = own_.noise;
-  const float rated = config_.filter.rated_torque_nm;
-  if (own_.calibrated == 0) {
-    // What the filter has seen so far carries the ripple of the offsets: begin anew from the means.
-    const float sigma = std::sqrt(n.filter.speed_variance + n.filter.angle_variance);
-    filter_.start(n.explained_rad_s, sigma + kSpeedFloor_rad_s, n.slow_torque_nm, 0.03F * rated);
-  } else {
-    filter_.loosen(0.01F * rated);
-  }
+  if (own_.calibrated != 0) return;  // a refinement: too small to upset what runs
+  // What the filter has seen so far carries the ripple of the offsets: begin anew from the means.
+  Noise& n = own_.noise;
+  const float sigma = std::sqrt(n.filter.speed_variance + n.filter.angle_variance);
+  filter_.start(n.explained_rad_s, sigma + kSpeedFloor_rad_s, n.slow_torque_nm,
+                kUncalibrated_ratio * config_.filter.rated_torque_nm);
+  n.idle_s = 0.0F;
+  n.after_restart = 0;
   own_.calibrated = 1;
-  own_.noise.after_restart = 0;
   air_.restart_average();
 }
 
@@ -153,12 +148,17 @@ void FusedObserver::measure_noise(const LoadTorqueFilter::Input& input, float ce
       torque_nm - moment_nm + n.last_moment_nm - (speed_rad_s - n.last_speed_rad_s) / g;
   const float d3 = torque_nm - 3.0F * n.torque_nm[0] + 3.0F * n.torque_nm[1] - n.torque_nm[2];
   const float d2 = unexplained - 2.0F * n.unexplained_nm[0] + n.unexplained_nm[1];
-  const float change = residual - n.residual_rad_s;
+  const std::size_t at = n.after_restart % n.residuals_rad_s.size();
+  const std::size_t before = (n.after_restart + n.residuals_rad_s.size() - 1) % n.residuals_rad_s.size();
+  const std::size_t half = (n.after_restart + kLag) % n.residuals_rad_s.size();
+  const float change = residual - n.residuals_rad_s[before];
+  const float lagged = residual - 2.0F * n.residuals_rad_s[half] + n.residuals_rad_s[at];
 
   ++n.after_restart;
   if (n.after_restart > kHistory) {
     n.block.e0 += change * change;
     n.block.e1 += change * n.step_rad_s;
+    n.block.lagged += lagged * lagged * (1.0F / 6.0F);
     n.block.third_nm2 += d3 * d3 * (1.0F / 20.0F);
     n.block.second_nm2 += d2 * d2 * (1.0F / 6.0F);
     if (++n.filled == kBlock) {
@@ -167,52 +167,49 @@ void FusedObserver::measure_noise(const LoadTorqueFilter::Input& input, float ce
     }
   }
   n.step_rad_s = change;
-  n.residual_rad_s = residual;
+  n.residuals_rad_s[at] = residual;
   n.last_moment_nm = moment_nm;
   n.last_speed_rad_s = speed_rad_s;
   n.torque_nm = {torque_nm, n.torque_nm[0], n.torque_nm[1]};
   n.unexplained_nm = {unexplained, n.unexplained_nm[0]};
-  if (n.blocks > 0) set_noise(residual, h);
+  if (n.blocks > 0) set_noise(h);
 }
 
 // A block much quieter than the mean shows that the mean held a transient; a much louder one is a
-// transient itself, unless it goes on.
+// transient itself and counts as a little louder.
 void FusedObserver::close_block(bool of_speed) noexcept {
   Noise& n = own_.noise;
   constexpr float kShare = 1.0F / static_cast<float>(kBlock);
-  const Differences d{.e0 = n.block.e0 * kShare,
-                      .e1 = n.block.e1 * kShare,
-                      .third_nm2 = n.block.third_nm2 * kShare,
-                      .second_nm2 = n.block.second_nm2 * kShare};
+  const Differences d = n.block;
   n.block = {};
   n.filled = 0;
-  if (!of_speed) {
-    // In the cut only the torque's noise is followed: it grows with the current.
-    const float share = 1.0F / static_cast<float>(kMostBlocks);
-    const float third_limit = kLoud_ratio * n.mean.third_nm2;
-    const float second_limit = kLoud_ratio * n.mean.second_nm2;
-    n.mean.third_nm2 += share * ((d.third_nm2 < third_limit ? d.third_nm2 : third_limit) - n.mean.third_nm2);
-    n.mean.second_nm2 += share * ((d.second_nm2 < second_limit ? d.second_nm2 : second_limit) - n.mean.second_nm2);
-    return;
-  }
-  if (n.blocks > 0 && d.e0 > kLoud_ratio * n.mean.e0 && ++n.refused < kMostRefused) return;
-  const bool anew = n.blocks == 0 || n.refused >= kMostRefused || d.e0 < kQuiet_ratio * n.mean.e0;
-  n.refused = 0;
-  if (anew) {
-    n.mean = d;
-    n.blocks = 1;
-    return;
-  }
-  if (n.blocks < kMostBlocks) ++n.blocks;
-  const float share = 1.0F / static_cast<float>(n.blocks);
-  n.mean.e0 += share * (d.e0 - n.mean.e0);
-  n.mean.e1 += share * (d.e1 - n.mean.e1);
-  n.mean.third_nm2 += share * (d.third_nm2 - n.mean.third_nm2);
-  n.mean.second_nm2 += share * (d.second_nm2 - n.mean.second_nm2);
+  const bool first = n.blocks == 0;
+  if (n.blocks < kMostBlocks && of_speed) ++n.blocks;
+  const float share = of_speed ? 1.0F / static_cast<float>(n.blocks) : 1.0F / static_cast<float>(kMostBlocks);
+  const auto blend = [first, share](float& mean, float sum) {
+    const float value = sum * kShare;
+    const float limit = kLoud_ratio * mean;
+    if (first || value < kQuiet_ratio * mean) {
+      mean = value;
+      return 1.0F;
+    }
+    const float taken = value < limit ? value : limit;
+    mean += share * (taken - mean);
+    return share * (value > 0.0F ? taken / value : 1.0F);
+  };
+  // In the cut only the torque's noise is followed: it grows with the current.
+  static_cast<void>(blend(n.mean.third_nm2, d.third_nm2));
+  static_cast<void>(blend(n.mean.second_nm2, d.second_nm2));
+  if (!of_speed) return;
+  const float e0 = n.mean.e0;
+  const float weight = blend(n.mean.e0, d.e0);
+  const float keep = weight < 1.0F && e0 > 0.0F ? (n.mean.e0 - weight * d.e0 * kShare) / e0 : 0.0F;
+  n.mean.e1 = keep * n.mean.e1 + weight * d.e1 * kShare;
+  static_cast<void>(blend(n.mean.lagged, d.lagged));
 }
 
 // Of the changes: white noise gives E0 = 2 W, E1 = -W; angle noise 6 A, -4 A.
-void FusedObserver::set_noise(float residual_rad_s, float duration_s) noexcept {
+void FusedObserver::set_noise(float duration_s) noexcept {
   Noise& n = own_.noise;
   float samples = duration_s / config_.flux.sample_period_s;
   if (!(samples > 1.0F)) samples = 1.0F;
@@ -225,15 +222,9 @@ void FusedObserver::set_noise(float residual_rad_s, float duration_s) noexcept {
   float floor = kSpeedFloor_rad_s * kSpeedFloor_rad_s;
   if (config_.sensorless) floor += kFluxFloor_rad_s * kFluxFloor_rad_s;
   if (!(white > floor)) white = floor;
-  // What is left of slow, coloured noise counts as white, else the filter believes it.
+  // Slow, coloured noise counts as white, else the filter believes it.
   const float known = white + 2.0F * angle;
-  if (n.idle_s > kColour_s) {
-    if (!(n.c0 > 0.0F)) n.c0 = known;
-    const float squared = residual_rad_s * residual_rad_s;
-    const float bound = kOutlier_ratio * n.c0;
-    n.c0 += duration_s / kNoiseTime_s * ((squared < bound ? squared : bound) - n.c0);
-  }
-  if (n.c0 > known) white += n.c0 - known;
+  if (n.mean.lagged > kColour_ratio * known) white += n.mean.lagged - known;
   n.filter.speed_variance = white;
   n.filter.angle_variance = angle;
   // The trapezoid shares each sample at a tick's end between two ticks; differences hide that.

@@ -78,27 +78,28 @@ class FusedObserver {
   struct Differences {
     float e0 = 0.0F;        // variance of the change of the speed that the torque leaves unexplained
     float e1 = 0.0F;        // its covariance from tick to tick
+    float lagged = 0.0F;    // variance of the second difference over kLag ticks, /6: slow noise
     float third_nm2 = 0.0F;   // third difference of the torque, /20
     float second_nm2 = 0.0F;  // second difference of the torque that the speed leaves unexplained, /6
   };
+
+  static constexpr std::size_t kLag = 8;  // ticks
 
   struct Noise {
     LoadTorqueFilter::Noise filter{};
     std::array<float, 3> torque_nm{};        // last ticks, for differences
     std::array<float, 2> unexplained_nm{};
     float explained_rad_s = 0.0F;            // speed that the torque explains
-    float residual_rad_s = 0.0F;             // the rest
+    std::array<float, 2 * kLag> residuals_rad_s{};  // the rest, a ring
     float step_rad_s = 0.0F;                 // its last change
     float last_speed_rad_s = 0.0F;
     float last_moment_nm = 0.0F;
     float slow_torque_nm = 0.0F;
     Differences block{};                     // sums of the block of ticks that is being filled
     Differences mean{};                      // of the blocks that count
-    float c0 = 0.0F;                         // variance of the rest in a long idle
     float idle_s = 0.0F;
     std::uint32_t filled = 0;                // ticks in the block
     std::uint32_t blocks = 0;                // in the mean, at most kMostBlocks
-    std::uint32_t refused = 0;               // blocks refused in a row
     std::uint32_t after_restart = 0;         // ticks since the rest began anew
     std::uint32_t idle_measured = 0;
   };
@@ -143,7 +144,7 @@ class FusedObserver {
   void track_frequency(const Rotation& rotation, float duration_s) noexcept;
   void measure_noise(const LoadTorqueFilter::Input& input, float centre_ratio, bool idle) noexcept;
   void close_block(bool of_speed) noexcept;
-  void set_noise(float residual_rad_s, float duration_s) noexcept;
+  void set_noise(float duration_s) noexcept;
 
   Config config_;
   FluxTorque flux_;
