@@ -31,7 +31,8 @@ if(CUTFORCE_SANITIZE)
   target_link_options(cutforce_options INTERFACE -fsanitize=address,undefined)
 endif()
 
-# The core throws nothing and knows no types at run time, on any machine.
+# The core throws nothing and knows no types at run time, on any machine. Linked PRIVATE: the host
+# program around it does.
 add_library(cutforce_core_options INTERFACE)
 target_link_libraries(cutforce_core_options INTERFACE cutforce_options)
 target_compile_options(cutforce_core_options INTERFACE
