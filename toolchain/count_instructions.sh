@@ -36,10 +36,14 @@ instructions() {
   sed -n 's/^==[0-9]*== Collected : \([0-9]*\).*/\1/p' <<< "$output"
 }
 
-if (($# == 0)); then
-  mapfile -t names < <("$program" --list)
-  set -- "${names[@]}"
-fi
+mapfile -t names < <("$program" --list)
+(($#)) || set -- "${names[@]}"
+for name in "$@"; do
+  printf '%s\n' "${names[@]}" | grep -qxF -- "$name" || {
+    echo "no body is named $name; there are: ${names[*]}" >&2
+    exit 2
+  }
+done
 compiler=$(sed -n 's/^CMAKE_CXX_COMPILER:[A-Z]*=//p' "$root/build/release/CMakeCache.txt")
 echo "# $("${compiler:-c++}" --version | head -n 1), -O2; mean over calls $((times + 1)) to $((2 * times))"
 printf '%-40s %s\n' '# body' 'instructions a call'

@@ -21,7 +21,10 @@ std::uint64_t allocation_count() noexcept { return allocations; }
 
 #ifdef __SANITIZE_ADDRESS__
 
-#include <sanitizer/allocator_interface.h>
+// From sanitizer/allocator_interface.h, which Debian packages with clang only.
+extern "C" int __sanitizer_install_malloc_and_free_hooks(
+    void (*malloc_hook)(const volatile void* block, std::size_t size),
+    void (*free_hook)(const volatile void* block));
 
 namespace {
 
