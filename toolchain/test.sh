@@ -28,6 +28,17 @@ count() {
   printf '%s passed, %s failed, %s skipped\n' "$((total - bad - dropped))" "$bad" "$dropped"
 }
 
+# skipped_tests FILE: name of each skipped test of a JUnit file, and why (as GTEST_SKIP says it).
+skipped_tests() {
+  awk '
+    /<testcase / { match($0, / name="[^"]*"/); name = substr($0, RSTART + 7, RLENGTH - 8); why = "" }
+    after { if ($0 != "") why = ": " $0; after = 0 }
+    /: Skipped$/ { after = 1 }
+    /<skipped/ { dropped = 1 }
+    /<\/testcase>/ { if (dropped) print "      skipped: " name why; dropped = after = 0 }' "$1" |
+    sed -e 's/&lt;/</g' -e 's/&gt;/>/g' -e 's/&quot;/"/g' -e "s/&apos;/'/g" -e 's/&amp;/\&/g'
+}
+
 # run_tests PRESET DIRECTORY: a failed test does not end the script; a ctest that ran none does.
 run_tests() {
   local preset=$1 junit=$PWD/$2/tests.xml began=$EPOCHREALTIME status=0 results=$2/tests.log
@@ -46,9 +57,11 @@ run_tests() {
   fi
   local failed_before=$failed
   count "$preset" "$junit"
-  sed -n 's/^ *[0-9]*\/[0-9]* Test *#[0-9]*: \(.*[^ .]\) \.*\**Skipped.*/      skipped: \1/p' "$results"
+  skipped_tests "$junit"
   if ((failed > failed_before || status != 0)); then
-    sed -n '/The following tests FAILED/,$p' "$results"
+    sed -n '/The following tests FAILED/,$p' "$results" | grep -v -e '(Skipped)$' -e '^Errors while'
+    grep -A 4 -e ': Failure$' -e 'ERROR: AddressSanitizer' -e 'runtime error:' "$results" |
+      head -n 60 || true
     ((failed > failed_before)) || failed=$((failed + 1))  # ctest says no, and names no test
   fi
 }
