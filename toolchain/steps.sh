@@ -31,13 +31,12 @@ step() {
 shown_step() {
   local title=$1 began=$EPOCHREALTIME status=0
   shift
-  printf '\n  %s\n\n' "$title"
+  printf '\n$ %s\n' "$*"
   printf '\n== %s\n$ %s\n' "$title" "$*" >> "$log"
   "$@" < /dev/null | tee -a "$log" || status=$?
   if ((status != 0)); then
-    printf '\nFailed after %s s: %s, exit status %s.\n$ %s\nThe full output is in %s\n' \
-      "$(elapsed_s "$began")" "$title" "$status" "$*" "$log"
+    printf '\nFailed: %s, with exit status %s. The full output is in %s\n' "$title" "$status" "$log"
     exit 1
   fi
-  printf '\n  %-46s%8s s\n' "$title: done" "$(elapsed_s "$began")"
+  printf '\n  %-46s%8s s\n' "$title" "$(elapsed_s "$began")"
 }

@@ -3,15 +3,18 @@
 //                       standard library   Eigen   own folder  below                 system
 //   estimator, control  core list          .cpp    yes         -                     -
 //   hal                 core list          -       yes         -                     -
-//   hal/host            yes + libraries    yes     yes         hal                   -
+//   hal/host            yes + libraries    yes     yes         hal                   file calls
 //   hal/linux, cortex_m yes                -       yes         hal                   .cpp
 //   firmware            core list          -       yes         estimator, control,   -
 //                                                              hal/port.hpp
-//   firmware/<root>     yes + libraries    -       yes         the same, hal/<root>  <unistd.h>
+//   firmware/host       yes + libraries    -       yes         the same, hal/host    file calls
+//   firmware/linux      yes + libraries    -       yes         the same, hal/linux   -
+//   firmware/cortex_m   yes                -       yes         the same, hal/cortex_m  -
 //   host_tests          yes + libraries    yes     yes         everything            yes
 //
 // "Core list": the headers that neither allocate, throw, print, nor read a clock; a list of what is
-// allowed, so that a header nobody thought of is refused. <unistd.h> in firmware/host: isatty().
+// allowed, so that a header nobody thought of is refused. "File calls": a few POSIX headers, in
+// .cpp files, for what the standard library cannot do.
 #pragma once
 
 #include <string>
