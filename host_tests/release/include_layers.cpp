@@ -67,43 +67,58 @@ Kind kind_of(const Include& include) {
 // What one layer may include, beside its own folder.
 struct Layer {
   std::string_view folder;
-  bool core;  // the core list only, and no exceptions to it
+  enum { kCoreList, kAllStandard } standard;
   enum { kNever, kSourcesOnly, kAlways } eigen;
-  bool libraries;
+  enum { kNoLibraries, kLibraries } libraries;
   enum { kNoSystem, kFileCalls, kSystemSources } system;
   std::array<std::string_view, 4> below;  // starts of project headers
 };
 
 // The longest folder that a path starts with decides.
 constexpr auto kLayers = std::to_array<Layer>({
-    {"estimator/", true, Layer::kSourcesOnly, false, Layer::kNoSystem, {}},
-    {"control/", true, Layer::kSourcesOnly, false, Layer::kNoSystem, {}},
-    {"hal/", true, Layer::kNever, false, Layer::kNoSystem, {}},
-    {"hal/host/", false, Layer::kAlways, true, Layer::kFileCalls, {"hal/port.hpp"}},
-    {"hal/linux/", false, Layer::kNever, false, Layer::kSystemSources, {"hal/port.hpp"}},
-    {"hal/cortex_m/", false, Layer::kNever, false, Layer::kSystemSources, {"hal/port.hpp"}},
-    {"firmware/",
-     true,
+    {"estimator/",
+     Layer::kCoreList,
+     Layer::kSourcesOnly,
+     Layer::kNoLibraries,
+     Layer::kNoSystem,
+     {}},
+    {"control/", Layer::kCoreList, Layer::kSourcesOnly, Layer::kNoLibraries, Layer::kNoSystem, {}},
+    {"hal/", Layer::kCoreList, Layer::kNever, Layer::kNoLibraries, Layer::kNoSystem, {}},
+    {"hal/host/", Layer::kAllStandard, Layer::kAlways, Layer::kLibraries, Layer::kFileCalls, {}},
+    {"hal/linux/",
+     Layer::kAllStandard,
      Layer::kNever,
-     false,
+     Layer::kNoLibraries,
+     Layer::kSystemSources,
+     {}},
+    {"hal/cortex_m/",
+     Layer::kAllStandard,
+     Layer::kNever,
+     Layer::kNoLibraries,
+     Layer::kSystemSources,
+     {}},
+    {"firmware/",
+     Layer::kCoreList,
+     Layer::kNever,
+     Layer::kNoLibraries,
      Layer::kNoSystem,
      {"estimator/", "control/", "hal/port.hpp"}},
     {"firmware/host/",
-     false,
+     Layer::kAllStandard,
      Layer::kNever,
-     true,
+     Layer::kLibraries,
      Layer::kFileCalls,
      {"estimator/", "control/", "hal/port.hpp", "hal/host/"}},
     {"firmware/linux/",
-     false,
+     Layer::kAllStandard,
      Layer::kNever,
-     true,
+     Layer::kLibraries,
      Layer::kNoSystem,
      {"estimator/", "control/", "hal/port.hpp", "hal/linux/"}},
     {"firmware/cortex_m/",
-     false,
+     Layer::kAllStandard,
      Layer::kNever,
-     false,
+     Layer::kNoLibraries,
      Layer::kNoSystem,
      {"estimator/", "control/", "hal/port.hpp", "hal/cortex_m/"}},
 });
@@ -119,13 +134,10 @@ const Layer* layer_of(std::string_view path) {
   return found;
 }
 
-// Own files, and for a composition root those of the firmware above it; never those of a subfolder
-// that has a layer of its own.
+// Own files, and those of the folder above; never those of a subfolder that is a layer of its own.
 bool is_own(const Layer& layer, std::string_view header) {
   const Layer* owner = layer_of(header);
-  if (owner == nullptr) return false;
-  if (owner == &layer) return true;
-  return owner->folder == "firmware/" && layer.folder.starts_with("firmware/");
+  return owner != nullptr && layer.folder.starts_with(owner->folder);
 }
 
 std::optional<std::string_view> broken_rule(const Layer& layer, bool source,
@@ -150,10 +162,11 @@ std::optional<std::string_view> broken_rule(const Layer& layer, bool source,
       return layer.eigen == Layer::kNever ? "Eigen is not for this folder"
                                           : "Eigen stays in the .cpp, behind plain arrays";
     case Kind::kStandard:
-      if (!layer.core || std::ranges::count(kCoreHeaders, header) != 0) return std::nullopt;
+      if (layer.standard == Layer::kAllStandard || std::ranges::count(kCoreHeaders, header) != 0)
+        return std::nullopt;
       return "not a standard header that the core may use (the list is in include_layers.cpp)";
     case Kind::kLibrary:
-      if (layer.libraries) return std::nullopt;
+      if (layer.libraries == Layer::kLibraries) return std::nullopt;
       return "libraries are for the host program";
     case Kind::kSystem:
       if (layer.system == Layer::kSystemSources && source) return std::nullopt;
