@@ -29,7 +29,9 @@ inline constexpr std::array<std::string_view, kFaultCount> kFaultNames{
 struct FaultSet {
   std::uint32_t bits = 0;
 
-  constexpr void insert(Fault fault) noexcept { bits |= std::uint32_t{1} << static_cast<unsigned>(fault); }
+  constexpr void insert(Fault fault) noexcept {
+    bits |= std::uint32_t{1} << static_cast<unsigned>(fault);
+  }
   [[nodiscard]] constexpr bool contains(Fault fault) const noexcept {
     return (bits >> static_cast<unsigned>(fault) & 1U) != 0;
   }

@@ -15,7 +15,7 @@ enum class LoopState : std::uint8_t {
   kNoEstimate,  // below the minimum speed, or the force cannot be told
   kAir,         // turning, not cutting: idle calibration and tare
   kCut,
-  kRefused,     // the signals cannot carry an estimate; fault says why
+  kRefused,  // the signals cannot carry an estimate; fault says why
 };
 
 struct LoopOutput {
@@ -29,21 +29,21 @@ struct LoopOutput {
     kOverride = 1U << 6,
   };
 
-  std::int64_t time_ns;            // end of the window that the row describes
+  std::int64_t time_ns;  // end of the window that the row describes
   float airgap_power_w;
   float measured_power_w;
-  float airgap_torque_nm;          // before inertia and friction
-  float load_torque_nm;            // after inertia: all that loads the motor
-  float cutting_torque_nm;         // after friction, at the motor
+  float airgap_torque_nm;   // before inertia and friction
+  float load_torque_nm;     // after inertia: all that loads the motor
+  float cutting_torque_nm;  // after friction, at the motor
   float cutting_torque_sigma_nm;
   float cutting_force_n;
   float cutting_force_sigma_n;
   float override_pct;
-  std::uint32_t present;           // Value bits; what is not there has value 0
+  std::uint32_t present;  // Value bits; what is not there has value 0
   estimator::FaultSet faults;
   Source source;
   LoopState state;
-  bool control_tick;               // the row ends a control period: override_pct is new
+  bool control_tick;  // the row ends a control period: override_pct is new
 };
 
 }  // namespace cutforce::firmware

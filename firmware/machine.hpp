@@ -11,71 +11,83 @@ namespace cutforce::firmware {
 
 enum class Winding : std::uint8_t { kStar, kDelta };
 enum class VoltageKind : std::uint8_t { kLineToNeutral, kLineToLine };
-enum class EstimatorName : std::uint8_t { kMeasured, kComputed, kSynthesized, kFused, kDynamometer };
+enum class EstimatorName : std::uint8_t {
+  kMeasured,
+  kComputed,
+  kSynthesized,
+  kFused,
+  kDynamometer
+};
 enum class ControllerName : std::uint8_t { kNone, kPi };
 enum class PowerMode : std::uint8_t { kDotProduct, kTwoWattmeter, kFixedPowerFactor };
 enum class SpeedSource : std::uint8_t { kRotor, kSynchronous, kSlip };
 enum class SwitchMode : std::uint8_t { kAbsolute, kPositiveOnly };
-enum class OverrideCode : std::uint8_t { kBinary, kFanucFv, kFanucOv10, kSiemensGray, kSiemensBinary };
+enum class OverrideCode : std::uint8_t {
+  kBinary,
+  kFanucFv,
+  kFanucOv10,
+  kSiemensGray,
+  kSiemensBinary
+};
 
 struct Machine {
   // [signals] what the sensors deliver. Corrected value = gain * (raw - offset).
   VoltageKind voltage_kind;
-  bool current_w_present;                         // false: i_w = -(i_u + i_v)
+  bool current_w_present;  // false: i_w = -(i_u + i_v)
   bool speed_present;
   bool power_meter_present;
-  float sample_rate_hz;                           // 0: from the recording
+  float sample_rate_hz;  // 0: from the recording
   std::array<float, 3> voltage_gain_ratio;
   std::array<float, 3> voltage_offset_v;
   std::array<float, 3> current_gain_ratio;
   std::array<float, 3> current_offset_a;
-  float voltage_lead_s;                           // voltages are this much ahead of the currents
+  float voltage_lead_s;  // voltages are this much ahead of the currents
   float voltage_limit_v;
   float current_limit_a;
   float speed_limit_rad_s;
   float power_limit_w;
-  float speed_lag_s;                              // the drive's filter on its speed output
-  float gap_limit_s;                              // longer gaps restart the estimator
+  float speed_lag_s;  // the drive's filter on its speed output
+  float gap_limit_s;  // longer gaps restart the estimator
 
   // [motor]
   Winding winding;
   float pole_pairs;
-  float stator_resistance_ohm;                    // per phase; 0: derived from the rating
+  float stator_resistance_ohm;  // per phase; 0: derived from the rating
   float stator_resistance_sigma_ratio;
-  float rotor_resistance_ohm;                     // star-equivalent, stator side; 0: derived
-  float leakage_inductance_h;                     // star-equivalent total; 0: derived
-  float iron_loss_w;                              // at rated speed and flux
-  bool iron_loss_declared;                        // false: unknown, iron_loss_w is 0
+  float rotor_resistance_ohm;  // star-equivalent, stator side; 0: derived
+  float leakage_inductance_h;  // star-equivalent total; 0: derived
+  float iron_loss_w;           // at rated speed and flux
+  bool iron_loss_declared;     // false: unknown, iron_loss_w is 0
   float rated_power_w;
-  float rated_torque_nm;                          // 0: derived
-  float rated_current_a_rms;                      // 0: derived
-  float rated_frequency_hz;                       // 0: derived from power and torque
-  float inertia_kg_m2;                            // all that turns, seen from the motor
+  float rated_torque_nm;      // 0: derived
+  float rated_current_a_rms;  // 0: derived
+  float rated_frequency_hz;   // 0: derived from power and torque
+  float inertia_kg_m2;        // all that turns, seen from the motor
   float inertia_sigma_ratio;
 
   // [friction] of motor and spindle, seen from the motor
   float coulomb_torque_nm;
   float viscous_nm_s_rad;
-  std::array<float, 3> load_friction_speed_rad_s; // support points of both tables
-  std::array<float, 3> load_friction_ratio;       // f(omega), P3 (8)
-  std::array<float, 3> load_friction_1_nm;        // g(omega), P3 (8)
+  std::array<float, 3> load_friction_speed_rad_s;  // support points of both tables
+  std::array<float, 3> load_friction_ratio;        // f(omega), P3 (8)
+  std::array<float, 3> load_friction_1_nm;         // g(omega), P3 (8)
 
   // [spindle] and workpiece
-  float gear_ratio;                               // motor turns per spindle turn
-  float workpiece_diameter_m;                     // or tool diameter (milling); 0: not given
-  float minimum_speed_rad_s;                      // below it there is no estimate
+  float gear_ratio;            // motor turns per spindle turn
+  float workpiece_diameter_m;  // or tool diameter (milling); 0: not given
+  float minimum_speed_rad_s;   // below it there is no estimate
 
   // [power_meter]
   float meter_scale_ratio;
   float meter_offset_w;
-  float meter_efficiency_ratio;                   // shaft side of the drive / meter reading
+  float meter_efficiency_ratio;  // shaft side of the drive / meter reading
   float meter_lag_s;
   float meter_noise_w;
 
   // [estimator]
   EstimatorName estimator;
-  float estimate_period_s;                        // 1 ms: the fused observer's tick
-  float control_period_s;                         // 50 ms
+  float estimate_period_s;  // 1 ms: the fused observer's tick
+  float control_period_s;   // 50 ms
   PowerMode power_mode;
   SpeedSource speed_source;
   float fixed_power_factor_ratio;
@@ -84,8 +96,8 @@ struct Machine {
   float switch_hold_s;
   float switch_compensation_ratio;
   float power_floor_w;
-  float edge_slope_1_s;                           // steepest force slope, rated torques per second
-  float drift_1_sqrt_s;                           // drift in the cut, rated torques per root second
+  float edge_slope_1_s;  // steepest force slope, rated torques per second
+  float drift_1_sqrt_s;  // drift in the cut, rated torques per root second
 
   // [control]
   ControllerName controller;
@@ -96,10 +108,10 @@ struct Machine {
   float override_floor_pct;
   float override_ceiling_pct;
   float override_initial_pct;
-  float override_step_pct;                        // 1 or 10
+  float override_step_pct;  // 1 or 10
   float slew_up_pct_s;
   float slew_down_pct_s;
-  float cut_threshold_n;                          // above it the tool is in the cut
+  float cut_threshold_n;  // above it the tool is in the cut
   OverrideCode override_code;
 };
 

@@ -41,18 +41,18 @@ enum class Signal : std::uint8_t {
 
 // One row of raw signals. Shapes: [3] in the order of Signal.
 struct Sample {
-  std::int64_t time_ns;                 // of sampling, any origin
+  std::int64_t time_ns;  // of sampling, any origin
   std::array<float, 3> voltage_v;
-  std::array<float, 3> current_a;       // line currents u, v, w
-  float speed_rad_s;                    // motor shaft, mechanical
-  float power_meter_w;                  // the drive's own slow power output
-  float measured_force_n;               // dynamometer; only the estimator `dynamometer` reads it
-  float feed_active;                    // 1 while the CNC feeds in a cutting move, else 0
-  float override_applied_pct;           // as the CNC reports it
-  float workpiece_diameter_m;           // may change while cutting
-  float feed_m_s;                       // as the CNC reports it
-  float enable;                         // 1: control allowed
-  std::uint32_t present;                // bit(Signal) of each value that is there
+  std::array<float, 3> current_a;  // line currents u, v, w
+  float speed_rad_s;               // motor shaft, mechanical
+  float power_meter_w;             // the drive's own slow power output
+  float measured_force_n;          // dynamometer; only the estimator `dynamometer` reads it
+  float feed_active;               // 1 while the CNC feeds in a cutting move, else 0
+  float override_applied_pct;      // as the CNC reports it
+  float workpiece_diameter_m;      // may change while cutting
+  float feed_m_s;                  // as the CNC reports it
+  float enable;                    // 1: control allowed
+  std::uint32_t present;           // bit(Signal) of each value that is there
 
   [[nodiscard]] constexpr bool has(Signal signal) const noexcept {
     return (present & bit(signal)) != 0;
@@ -62,16 +62,16 @@ static_assert(std::is_trivially_copyable_v<Sample>);
 
 // What the loop sends, once a control tick.
 struct Command {
-  std::int64_t time_ns;       // of the last sample that it rests on
-  std::uint8_t override_pct;  // 0..254, after limits, slew and rounding
-  std::uint8_t override_code; // the byte on the port, in the configured code
-  bool controlling;           // false: monitor only, override_pct is the neutral value
+  std::int64_t time_ns;        // of the last sample that it rests on
+  std::uint8_t override_pct;   // 0..254, after limits, slew and rounding
+  std::uint8_t override_code;  // the byte on the port, in the configured code
+  bool controlling;            // false: monitor only, override_pct is the neutral value
 };
 
 enum class PortError : std::uint8_t {
-  kMalformed,     // data that cannot be understood; the port kept where and why
-  kLinkLost,      // the other side went away
-  kSystem,        // the operating system refused
+  kMalformed,  // data that cannot be understood; the port kept where and why
+  kLinkLost,   // the other side went away
+  kSystem,     // the operating system refused
 };
 
 // read() fills the front of `block` and returns how many samples it filled, at least one; it may

@@ -11,7 +11,8 @@ TEST(FaultSet, HoldsExactlyWhatWasInserted) {
   faults.insert(estimator::Fault::kClipped);
   EXPECT_TRUE(faults.contains(estimator::Fault::kClipped));
   EXPECT_FALSE(faults.contains(estimator::Fault::kGap));
-  EXPECT_EQ(estimator::kFaultNames[static_cast<std::size_t>(estimator::Fault::kClipped)], "clipped");
+  EXPECT_EQ(estimator::kFaultNames[static_cast<std::size_t>(estimator::Fault::kClipped)],
+            "clipped");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE RelWithDebInfo)
 endif()
+set(CMAKE_CXX_FLAGS_DEBUG "-O1 -g")
 set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g")
 set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
 
@@ -23,11 +24,15 @@ target_compile_definitions(cutforce_options INTERFACE
   EIGEN_DONT_VECTORIZE EIGEN_MAX_ALIGN_BYTES=8 EIGEN_NO_MALLOC)
 if(CUTFORCE_SANITIZE)
   target_compile_options(cutforce_options INTERFACE
-    -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+    # GCC takes what the sanitizers insert for reads of unset memory; the release build still warns.
+    -Wno-maybe-uninitialized)
+  target_compile_definitions(cutforce_options INTERFACE _GLIBCXX_ASSERTIONS)
   target_link_options(cutforce_options INTERFACE -fsanitize=address,undefined)
 endif()
 
-# The core throws nothing and knows no types at run time, on any machine.
+# The core throws nothing and knows no types at run time, on any machine. Linked PRIVATE: the host
+# program around it does.
 add_library(cutforce_core_options INTERFACE)
 target_link_libraries(cutforce_core_options INTERFACE cutforce_options)
 target_compile_options(cutforce_core_options INTERFACE
