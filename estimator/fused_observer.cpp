@@ -11,16 +11,9 @@ constexpr float kTwoPi = 6.28318530718F;
 constexpr float kFrequencyTime_s = 0.015F;
 constexpr float kLowestFrequency_rad_s = kTwoPi * 3.0F;
 constexpr float kLock_s = 0.03F;
-constexpr float kExplainTime_s = 0.1F;
-constexpr std::uint32_t kHistory = 2 * FusedObserver::kLag;  // ticks until the differences are filled
-constexpr std::uint32_t kBlock = 50;        // ticks
-constexpr std::uint32_t kMostBlocks = 16;
-constexpr float kLoud_ratio = 2.5F;
-constexpr float kQuiet_ratio = 0.4F;
-constexpr float kSpeedFloor_rad_s = 3e-5F;  // rounding of a recorded speed
-constexpr float kFluxFloor_rad_s = 0.01F;
+constexpr float kInertiaWait_s = 0.1F;       // after the lock: the flux has settled
 constexpr float kUncalibrated_ratio = 0.03F;
-constexpr float kColour_ratio = 1.5F;
+constexpr float kTareFollow_ratio = 0.02F;   // of what the tare belongs to, each tick
 
 float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
 
@@ -30,308 +23,287 @@ float rotated(SpaceVector now, SpaceVector before) noexcept {
 
 }  // namespace
 
-FusedObserver::FusedObserver(const Config& config, const FluxTorque& flux,
-                             const LoadTorqueFilter& filter, const AirCut& air) noexcept
-    : config_(config), flux_(flux), filter_(filter), air_(air) {
-  const float torque_sigma_nm = 0.02F * config.filter.rated_torque_nm;
-  own_.noise.filter = {.speed_variance = 0.03F * 0.03F,
-                       .angle_variance = 0.0F,
-                       .torque_variance = torque_sigma_nm * torque_sigma_nm,
-                       .centre_ratio = 0.0F};
+FusedObserver::FusedObserver(const Config& config) noexcept
+    : config_(config),
+      flux_(*FluxTorque::make(config.flux)),
+      filter_(*LoadTorqueFilter::make(config.filter)),
+      air_(*AirCut::make(config.air)),
+      noise_({.sample_period_s = config.flux.sample_period_s,
+              .rated_torque_nm = config.filter.rated_torque_nm,
+              .sensorless = config.sensorless}),
+      inertia_(*RunUpInertia::make(config.inertia)),
+      resistance_(*StatorResistance::make(config.resistance)),
+      meter_(*PowerScale::make(config.meter)) {
+  tick_.calibrated = config.calibrate ? 0U : 1U;
 }
 
 auto FusedObserver::make(const Config& config) noexcept
     -> std::expected<FusedObserver, ConfigError> {
   if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return FusedObserver{config, *FluxTorque::make(config.flux),
-                       *LoadTorqueFilter::make(config.filter), *AirCut::make(config.air)};
+  return FusedObserver{config};
 }
 
 auto FusedObserver::state() const noexcept -> State {
-  State state = own_;
-  state.flux = flux_.state();
-  state.filter = filter_.state();
-  state.air = air_.state();
-  return state;
+  return {.flux = flux_.state(),
+          .filter = filter_.state(),
+          .air = air_.state(),
+          .noise = noise_.state(),
+          .ripple = ripple_.state(),
+          .inertia = inertia_.state(),
+          .resistance = resistance_.state(),
+          .meter = meter_.state(),
+          .tick = tick_};
 }
 
 void FusedObserver::restore(const State& state) noexcept {
-  own_ = state;
   flux_.restore(state.flux);
   filter_.restore(state.filter);
   air_.restore(state.air);
+  noise_.restore(state.noise);
+  ripple_.restore(state.ripple);
+  inertia_.restore(state.inertia);
+  resistance_.restore(state.resistance);
+  meter_.restore(state.meter);
+  tick_ = state.tick;
 }
 
 void FusedObserver::step(const Sample& sample) noexcept {
   flux_.step(sample.motor, sample.elapsed_periods);
   if (sample.speed_valid) {
-    own_.speed_sum_rad_s += sample.speed_rad_s;
-    ++own_.speed_count;
+    tick_.speed_sum_rad_s += sample.speed_rad_s;
+    ++tick_.speed_count;
+  }
+  if (sample.meter_valid) {
+    tick_.meter_w = sample.power_meter_w;
+    ++tick_.meter_count;
   }
 }
 
-void FusedObserver::recalibrated(SpaceVector voltage_offset_v, SpaceVector current_offset_a) noexcept {
+void FusedObserver::recalibrated(SpaceVector voltage_offset_v,
+                                 SpaceVector current_offset_a) noexcept {
   flux_.remove_offset(voltage_offset_v, current_offset_a);
   const SpaceVector psi = flux_.state().flux_v_s;
   const SpaceVector i = flux_.state().current_a;
   const float l = config_.leakage_inductance_h;
-  own_.rotor_flux_v_s = {psi.alpha - l * i.alpha, psi.beta - l * i.beta};
-  own_.current_a = i;
-  if (own_.calibrated != 0) return;  // a refinement: too small to upset what runs
+  tick_.rotor_flux_v_s = {psi.alpha - l * i.alpha, psi.beta - l * i.beta};
+  tick_.current_a = i;
+  if (tick_.calibrated != 0) return;  // a refinement: too small to upset what runs
   // What the filter has seen so far carries the ripple of the offsets: begin anew from the means.
-  Noise& n = own_.noise;
-  const float sigma = std::sqrt(n.filter.speed_variance + n.filter.angle_variance);
-  filter_.start(n.explained_rad_s, sigma + kSpeedFloor_rad_s, n.slow_torque_nm,
-                kUncalibrated_ratio * config_.filter.rated_torque_nm);
-  n.idle_s = 0.0F;
-  n.after_restart = 0;
-  own_.calibrated = 1;
+  const LoadTorqueFilter::Noise& noise = noise_.noise();
+  filter_.start(noise_.explained_speed_rad_s(),
+                std::sqrt(noise.speed_variance + noise.angle_variance),
+                noise_.mean_torque_nm(), kUncalibrated_ratio * config_.filter.rated_torque_nm);
+  noise_.restart();
   air_.restart_average();
+  tick_.calibrated = 1;
 }
 
 auto FusedObserver::rotation(const FluxTorque::Window& window) noexcept -> Rotation {
   const float l = config_.leakage_inductance_h;
   const SpaceVector i = window.current_a;
   const SpaceVector rotor{window.flux_v_s.alpha - l * i.alpha, window.flux_v_s.beta - l * i.beta};
-  const Rotation result{.flux_rad_s = rotated(rotor, own_.rotor_flux_v_s) / window.duration_s,
-                        .current_rad_s = rotated(i, own_.current_a) / window.duration_s,
-                        .flux_squared = dot(rotor, rotor)};
-  own_.rotor_flux_v_s = rotor;
-  own_.current_a = i;
+  const Rotation result{
+      .flux_rad_s = rotated(rotor, tick_.rotor_flux_v_s) / window.duration_s,
+      .current_rad_s = rotated(i, tick_.current_a) / window.duration_s,
+      .flux_squared = dot(rotor, rotor)};  // (E100)
+  tick_.rotor_flux_v_s = rotor;
+  tick_.current_a = i;
   return result;
 }
 
 void FusedObserver::track_frequency(const Rotation& r, float duration_s) noexcept {
-  const float w = own_.frequency_rad_s;
+  const float w = tick_.frequency_rad_s;
   const float size = magnitude(w);
   const float flux_floor = 0.3F * config_.rated_flux_v_s;
   const bool flux_agrees = r.flux_squared > flux_floor * flux_floor &&
                            magnitude(r.flux_rad_s - w) < 0.3F * size + 20.0F &&
                            magnitude(r.current_rad_s - w) < 0.5F * size + 60.0F;
   const float seen = flux_agrees ? r.flux_rad_s : r.current_rad_s;
-  const float share = duration_s < kFrequencyTime_s
-                          ? 1.0F - exp_bounded(-duration_s / kFrequencyTime_s)
-                          : 0.63F;
-  own_.frequency_rad_s += share * (seen - w);  // (E101)
-  flux_.set_frequency(own_.frequency_rad_s);
+  const float share = 1.0F - exp_bounded(-duration_s / kFrequencyTime_s);
+  tick_.frequency_rad_s += share * (seen - w);  // (E101)
+  flux_.set_frequency(tick_.frequency_rad_s);
 
-  const bool turning = magnitude(own_.frequency_rad_s) > kLowestFrequency_rad_s;
-  const bool agrees = magnitude(r.current_rad_s - own_.frequency_rad_s) <
-                      0.3F * magnitude(own_.frequency_rad_s) + 20.0F;
-  const bool was_locked = own_.locked_s > 0.0F;
-  if (turning && (agrees || was_locked)) {
+  const float now = magnitude(tick_.frequency_rad_s);
+  const bool agrees = magnitude(r.current_rad_s - tick_.frequency_rad_s) < 0.3F * now + 20.0F;
+  const bool was_locked = tick_.locked_s > 0.0F;
+  if (now > kLowestFrequency_rad_s && (agrees || was_locked)) {
     if (!was_locked) flux_.seed();
-    own_.locked_s += duration_s;
+    tick_.locked_s += duration_s;
   } else {
-    own_.locked_s = 0.0F;
+    tick_.locked_s = 0.0F;
   }
 }
 
-void FusedObserver::measure_noise(const LoadTorqueFilter::Input& input, float centre_ratio,
-                                  bool idle) noexcept {
-  Noise& n = own_.noise;
-  const auto [torque_nm, moment_nm, speed_rad_s, h, valid] = input;
-  if (!valid) return;
-  const float g = h / config_.filter.inertia_kg_m2;
-  n.idle_s = idle ? n.idle_s + h : 0.0F;
-  if (n.after_restart == 0 || (idle && n.idle_s <= h)) {
-    n.explained_rad_s = speed_rad_s;
-    n.slow_torque_nm = torque_nm;
-    n.after_restart = 0;
+auto FusedObserver::take_speed(const Rotation& r, float torque_nm, bool locked,
+                               float duration_s) noexcept -> Speed {
+  const auto samples = static_cast<float>(tick_.speed_count);
+  Speed speed{.mean_rad_s = samples > 0.0F ? tick_.speed_sum_rad_s / samples : 0.0F,
+              .samples = samples,
+              .valid = samples > 0.0F};
+  tick_.speed_sum_rad_s = 0.0F;
+  tick_.speed_count = 0;
+  if (!config_.sensorless) {
+    if (speed.valid) speed.mean_rad_s -= ripple_.step(speed.mean_rad_s, duration_s);
+    return speed;
   }
-  n.slow_torque_nm += (torque_nm - n.slow_torque_nm) * h / kExplainTime_s;
-  n.explained_rad_s += g * (torque_nm - n.slow_torque_nm);
-  const float residual =
-      speed_rad_s - n.explained_rad_s + g * (moment_nm - centre_ratio * n.slow_torque_nm);
-  n.explained_rad_s += residual * h / kExplainTime_s;
-  const float unexplained =
-      torque_nm - moment_nm + n.last_moment_nm - (speed_rad_s - n.last_speed_rad_s) / g;
-  const float d3 = torque_nm - 3.0F * n.torque_nm[0] + 3.0F * n.torque_nm[1] - n.torque_nm[2];
-  const float d2 = unexplained - 2.0F * n.unexplained_nm[0] + n.unexplained_nm[1];
-  const std::size_t at = n.after_restart % n.residuals_rad_s.size();
-  const std::size_t before = (n.after_restart + n.residuals_rad_s.size() - 1) % n.residuals_rad_s.size();
-  const std::size_t half = (n.after_restart + kLag) % n.residuals_rad_s.size();
-  const float change = residual - n.residuals_rad_s[before];
-  const float lagged = residual - 2.0F * n.residuals_rad_s[half] + n.residuals_rad_s[at];
-
-  ++n.after_restart;
-  if (n.after_restart > kHistory) {
-    n.block.e0 += change * change;
-    n.block.e1 += change * n.step_rad_s;
-    n.block.lagged += lagged * lagged * (1.0F / 6.0F);
-    n.block.third_nm2 += d3 * d3 * (1.0F / 20.0F);
-    n.block.second_nm2 += d2 * d2 * (1.0F / 6.0F);
-    if (++n.filled == kBlock) {
-      close_block(idle || n.idle_measured == 0);
-      if (idle && own_.calibrated != 0) n.idle_measured = 1;
-    }
-  }
-  n.step_rad_s = change;
-  n.residuals_rad_s[at] = residual;
-  n.last_moment_nm = moment_nm;
-  n.last_speed_rad_s = speed_rad_s;
-  n.torque_nm = {torque_nm, n.torque_nm[0], n.torque_nm[1]};
-  n.unexplained_nm = {unexplained, n.unexplained_nm[0]};
-  if (n.blocks > 0) set_noise(h);
+  const float p = config_.flux.pole_pairs;
+  speed.valid = locked && r.flux_squared > 0.0F;
+  const float slip = speed.valid ? 2.0F * config_.resistance.rotor_resistance_ohm * torque_nm /
+                                       (3.0F * p * r.flux_squared)
+                                 : 0.0F;
+  speed.mean_rad_s = (r.flux_rad_s - slip) / p;  // (E102)
+  return speed;
 }
 
-// A block much quieter than the mean shows that the mean held a transient; a much louder one is a
-// transient itself and counts as a little louder.
-void FusedObserver::close_block(bool of_speed) noexcept {
-  Noise& n = own_.noise;
-  constexpr float kShare = 1.0F / static_cast<float>(kBlock);
-  const Differences d = n.block;
-  n.block = {};
-  n.filled = 0;
-  const bool first = n.blocks == 0;
-  if (n.blocks < kMostBlocks && of_speed) ++n.blocks;
-  const float share = of_speed ? 1.0F / static_cast<float>(n.blocks) : 1.0F / static_cast<float>(kMostBlocks);
-  const auto blend = [first, share](float& mean, float sum) {
-    const float value = sum * kShare;
-    const float limit = kLoud_ratio * mean;
-    if (first || value < kQuiet_ratio * mean) {
-      mean = value;
-      return 1.0F;
-    }
-    const float taken = value < limit ? value : limit;
-    mean += share * (taken - mean);
-    return share * (value > 0.0F ? taken / value : 1.0F);
-  };
-  // In the cut only the torque's noise is followed: it grows with the current.
-  static_cast<void>(blend(n.mean.third_nm2, d.third_nm2));
-  static_cast<void>(blend(n.mean.second_nm2, d.second_nm2));
-  if (!of_speed) return;
-  const float e0 = n.mean.e0;
-  const float weight = blend(n.mean.e0, d.e0);
-  const float keep = weight < 1.0F && e0 > 0.0F ? (n.mean.e0 - weight * d.e0 * kShare) / e0 : 0.0F;
-  n.mean.e1 = keep * n.mean.e1 + weight * d.e1 * kShare;
-  static_cast<void>(blend(n.mean.lagged, d.lagged));
+float FusedObserver::correction_nm(const FluxTorque::Window& window, float copper) const noexcept {
+  const float by_power =
+      window.power_w * config_.flux.pole_pairs / tick_.frequency_rad_s - tick_.idle_power_torque_nm;
+  return (meter_.gain_ratio() - 1.0F) * by_power -
+         resistance_.change_ohm() * (copper - tick_.idle_copper);
 }
 
-// Of the changes: white noise gives E0 = 2 W, E1 = -W; angle noise 6 A, -4 A.
-void FusedObserver::set_noise(float duration_s) noexcept {
-  Noise& n = own_.noise;
-  float samples = duration_s / config_.flux.sample_period_s;
-  if (!(samples > 1.0F)) samples = 1.0F;
-  float angle = -0.5F * n.mean.e0 - n.mean.e1;
-  const float most = n.mean.e0 * (1.0F / 6.0F);
-  if (angle > most) angle = most;
-  // Within the scatter of e1, or the mixture that noise makes of the flux angle, it is white.
-  if (!(angle > 0.1F * n.mean.e0) || config_.sensorless) angle = 0.0F;
-  float white = 0.5F * n.mean.e0 - 3.0F * angle;
-  float floor = kSpeedFloor_rad_s * kSpeedFloor_rad_s;
-  if (config_.sensorless) floor += kFluxFloor_rad_s * kFluxFloor_rad_s;
-  if (!(white > floor)) white = floor;
-  // Slow, coloured noise counts as white, else the filter believes it.
-  const float known = white + 2.0F * angle;
-  if (n.mean.lagged > kColour_ratio * known) white += n.mean.lagged - known;
-  n.filter.speed_variance = white;
-  n.filter.angle_variance = angle;
-  // The trapezoid shares each sample at a tick's end between two ticks; differences hide that.
-  const float third = n.mean.third_nm2 * samples / (samples - 0.875F);
-  const float second = n.mean.second_nm2 * samples / (samples - 0.833F);
-  n.filter.torque_variance = third < second ? third : second;
+auto FusedObserver::unlocked(float speed_rad_s, AirCut::Feed feed, Output out) noexcept -> Output {
+  tick_.ticks = 0;
+  noise_.restart();
+  ripple_.forget();
+  static_cast<void>(air_.step({.load_torque_nm = 0.0F,
+                               .sigma_nm = 0.0F,
+                               .airgap_torque_nm = 0.0F,
+                               .speed_rad_s = speed_rad_s,
+                               .speed_sigma_rad_s = 0.0F,
+                               .duration_s = out.duration_s,
+                               .feed = feed,
+                               .calibrated = tick_.calibrated != 0,
+                               .valid = false}));
+  inertia_.step({.torque_nm = 0.0F, .speed_rad_s = 0.0F, .duration_s = out.duration_s,
+                 .valid = false, .tared = false, .tare_nm = 0.0F});
+  out.valid = false;
+  out.phase = AirCut::Phase::kUnsteady;
+  out.speed_rad_s = speed_rad_s;
+  return out;
+}
+
+float FusedObserver::sigma_nm(const LoadTorqueFilter::Output& load, const AirCut::Output& air,
+                              float torque_nm, float copper, float change_nm) const noexcept {
+  const float rated = config_.filter.rated_torque_nm;
+  const float model = 5e-4F * rated;
+  const float scale = 0.003F * air.net_torque_nm;
+  const float inertia = inertia_.sigma_ratio() * (torque_nm - load.load_torque_nm);
+  const float resistance = resistance_.change_sigma_ohm() * (copper - tick_.idle_copper);
+  const float moved = 0.7F * change_nm;
+  const float noise = load.variance_nm2 > air.idle_variance_nm2 ? load.variance_nm2
+                                                                : air.idle_variance_nm2;
+  return std::sqrt(noise + model * model + scale * scale + inertia * inertia +
+                   resistance * resistance + moved * moved +
+                   air.tare_sigma_nm * air.tare_sigma_nm);  // (E104)
+}
+
+void FusedObserver::learn(const FluxTorque::Window& window, const Rotation& r, const Output& out,
+                          float copper, float speed_rad_s) noexcept {
+  if (out.phase == AirCut::Phase::kIdle) {
+    const float power = window.power_w * config_.flux.pole_pairs / tick_.frequency_rad_s;
+    const float share = out.idle_s <= out.duration_s ? 1.0F : kTareFollow_ratio;
+    tick_.idle_copper += share * (copper - tick_.idle_copper);
+    tick_.idle_power_torque_nm += share * (power - tick_.idle_power_torque_nm);
+  }
+  if (tick_.meter_count > 0) meter_.step(window.power_w, tick_.meter_w, out.duration_s);
+  tick_.meter_count = 0;
+  if (!config_.track_resistance || config_.sensorless) return;
+  // |psi_R|^2 with the resistance found so far: psi less dR i / (j w_e).
+  const float k = resistance_.change_ohm() / tick_.frequency_rad_s;
+  const SpaceVector rotor{tick_.rotor_flux_v_s.alpha - k * window.current_a.beta,
+                          tick_.rotor_flux_v_s.beta + k * window.current_a.alpha};
+  resistance_.step({.flux_squared = dot(rotor, rotor),
+                    .flux_frequency_rad_s = r.flux_rad_s,
+                    .speed_rad_s = speed_rad_s,
+                    .frequency_rad_s = tick_.frequency_rad_s,
+                    .torque_nm = window.torque_nm,
+                    .current_squared_a2 = window.current_squared_a2,
+                    .duration_s = out.duration_s,
+                    .steady = out.steady && tick_.calibrated != 0});
 }
 
 auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
   const FluxTorque::Window window = flux_.take();
   Output out{};
+  out.duration_s = window.duration_s;
   if (!(window.duration_s > 0.0F)) return out;
   const float h = window.duration_s;
   const Rotation r = rotation(window);
   track_frequency(r, h);
-
-  const float p = config_.flux.pole_pairs;
-  const float torque = window.torque_nm;
-  bool speed_valid = own_.speed_count > 0;
-  float speed = speed_valid ? own_.speed_sum_rad_s / static_cast<float>(own_.speed_count) : 0.0F;
-  const auto samples = static_cast<float>(own_.speed_count);
-  own_.speed_sum_rad_s = 0.0F;
-  own_.speed_count = 0;
-  const bool locked = own_.locked_s > kLock_s;
-  if (config_.sensorless) {
-    speed_valid = locked && r.flux_squared > 0.0F;
-    const float slip = speed_valid ? 2.0F * config_.rotor_resistance_ohm * torque /
-                                         (3.0F * p * r.flux_squared)
-                                   : 0.0F;
-    speed = (r.flux_rad_s - slip) / p;  // (E102)
-  }
-
-  LoadTorqueFilter::Noise noise = own_.noise.filter;
-  const bool by_angle = noise.angle_variance > 0.0F || config_.sensorless;
-  noise.centre_ratio = by_angle ? 0.5F : 0.5F * (samples - 1.0F) / (samples > 0.0F ? samples : 1.0F);
-  if (config_.sensorless) noise.torque_variance *= 4.0F;
-
-  out.duration_s = h;
-  out.frequency_rad_s = own_.frequency_rad_s;
-  out.airgap_torque_nm = torque;
+  const bool locked = tick_.locked_s > kLock_s;
+  const Speed speed = take_speed(r, window.torque_nm, locked, h);
+  out.frequency_rad_s = tick_.frequency_rad_s;
+  out.airgap_torque_nm = window.torque_nm;
   out.airgap_power_w =
       window.power_w - 1.5F * config_.flux.stator_resistance_ohm * window.current_squared_a2;
-  out.valid = locked && (speed_valid || own_.ticks > 0);
-  if (!locked) {
-    own_.ticks = 0;
-    out.speed_rad_s = speed;
-    static_cast<void>(air_.step({.load_torque_nm = 0.0F, .sigma_nm = 0.0F, .airgap_torque_nm = torque,
-                                 .speed_rad_s = speed, .speed_sigma_rad_s = 0.0F, .duration_s = h,
-                                 .feed = feed, .calibrated = false, .valid = false}));
-    own_.noise.idle_s = 0.0F;
-    own_.noise.after_restart = 0;
-    out.valid = false;
-    return out;
-  }
-  if (own_.ticks == 0) filter_.start(speed, 1.0F, torque, config_.filter.rated_torque_nm);
-  ++own_.ticks;
+  if (!locked || (!speed.valid && tick_.ticks == 0)) return unlocked(speed.mean_rad_s, feed, out);
 
-  const float moment_nm =
-      by_angle ? window.moment_nm + 0.5F * torque * config_.flux.sample_period_s / h
-               : window.moment_nm;
-  const LoadTorqueFilter::Input input{.torque_nm = torque,
-                                      .moment_nm = moment_nm,
-                                      .speed_rad_s = speed,
-                                      .duration_s = h,
-                                      .speed_valid = speed_valid};
+  const float p = config_.flux.pole_pairs;
+  const float copper = 1.5F * window.current_squared_a2 * p / tick_.frequency_rad_s;
+  const float torque = window.torque_nm + correction_nm(window, copper);
+  LoadTorqueFilter::Noise noise = noise_.noise();
+  const bool by_angle = noise_.counts() || config_.sensorless;
+  noise.centre_ratio = by_angle ? 0.5F : 0.5F - 0.5F / (speed.samples > 1.0F ? speed.samples : 1.0F);
+  if (config_.sensorless) noise.torque_variance *= 4.0F;
+  const LoadTorqueFilter::Input input{
+      .torque_nm = torque,
+      .moment_nm = by_angle ? window.moment_nm + 0.5F * window.torque_nm *
+                                                     config_.flux.sample_period_s / h
+                            : window.moment_nm,
+      .speed_rad_s = speed.mean_rad_s,
+      .duration_s = h,
+      .inertia_kg_m2 = inertia_.inertia_kg_m2(),
+      .speed_valid = speed.valid};
+  if (tick_.ticks == 0) {
+    filter_.start(speed.mean_rad_s, 1.0F, torque, config_.filter.rated_torque_nm);
+  }
+  ++tick_.ticks;
+
   const LoadTorqueFilter::Output load = filter_.step(input, noise);
-  const float change = load.load_torque_nm - own_.load_torque_nm;
-  own_.load_torque_nm = load.load_torque_nm;
-
-  const float speed_sigma = std::sqrt(noise.speed_variance + 2.0F * noise.angle_variance);
-  const AirCut::Output air = air_.step({.load_torque_nm = load.load_torque_nm,
-                                        .sigma_nm = std::sqrt(load.variance_nm2),
-                                        .airgap_torque_nm = torque,
-                                        .speed_rad_s = load.speed_rad_s,
-                                        .speed_sigma_rad_s = speed_sigma,
-                                        .duration_s = h,
-                                        .feed = feed,
-                                        .calibrated = own_.calibrated != 0,
-                                        .valid = true});
-  if (air.phase == AirCut::Phase::kIdle) {
-    own_.idle_current_a2 += (window.current_squared_a2 - own_.idle_current_a2) * 0.02F;
+  const float change = load.load_torque_nm - tick_.load_torque_nm;
+  tick_.load_torque_nm = load.load_torque_nm;
+  const AirCut::Output air =
+      air_.step({.load_torque_nm = load.load_torque_nm,
+                 .sigma_nm = std::sqrt(load.variance_nm2),
+                 .airgap_torque_nm = torque,
+                 .speed_rad_s = load.speed_rad_s,
+                 .speed_sigma_rad_s =
+                     std::sqrt(noise.speed_variance + 2.0F * noise.angle_variance),
+                 .duration_s = h,
+                 .feed = feed,
+                 .calibrated = tick_.calibrated != 0,
+                 .valid = true});
+  const bool idle = air.phase == AirCut::Phase::kIdle;
+  if (speed.valid) {
+    noise_.step({.torque_nm = torque,
+                 .moment_nm = input.moment_nm,
+                 .speed_rad_s = speed.mean_rad_s,
+                 .duration_s = h,
+                 .inertia_kg_m2 = input.inertia_kg_m2,
+                 .idle = idle,
+                 .calibrated = tick_.calibrated != 0});
   }
-  measure_noise(input, noise.centre_ratio, air.phase == AirCut::Phase::kIdle);
+  inertia_.step({.torque_nm = window.torque_nm,
+                 .speed_rad_s = load.speed_rad_s,
+                 .duration_s = h,
+                 .valid = tick_.locked_s > kLock_s + kInertiaWait_s,
+                 .tared = idle,
+                 .tare_nm = air.tare_nm});
 
-  // (E104)
-  const float rated = config_.filter.rated_torque_nm;
-  const float model = 5e-4F * rated;
-  const float scale = 0.003F * air.net_torque_nm;
-  const float inertia = config_.inertia_sigma_ratio * (torque - load.load_torque_nm);
-  const float copper = 1.5F * config_.stator_resistance_sigma_ohm *
-                       (window.current_squared_a2 - own_.idle_current_a2) * p /
-                       own_.frequency_rad_s;
-  const float noise2 = load.variance_nm2 > air.idle_variance_nm2 ? load.variance_nm2
-                                                                 : air.idle_variance_nm2;
-  const float moved = 0.7F * change;
-  out.phase = air.phase;
+  out.valid = true;
   out.steady = air.steady;
-  out.calibrated = own_.calibrated != 0;
+  out.calibrated = tick_.calibrated != 0;
+  out.phase = air.phase;
+  out.airgap_torque_nm = torque;
   out.load_torque_nm = load.load_torque_nm;
   out.net_torque_nm = air.net_torque_nm;
-  out.net_sigma_nm = std::sqrt(noise2 + model * model + scale * scale + inertia * inertia +
-                               copper * copper + moved * moved +
-                               air.tare_sigma_nm * air.tare_sigma_nm);
+  out.net_sigma_nm = sigma_nm(load, air, torque, copper, change);
   out.speed_rad_s = load.speed_rad_s;
   out.tare_nm = air.tare_nm;
   out.tare_age_s = air.tare_age_s;
   out.idle_s = air.idle_s;
+  learn(window, r, out, copper, speed.mean_rad_s);
   return out;
 }
 

@@ -1,13 +1,19 @@
-// Cutting torque from phase voltages and currents, speed and their noise, fused.
+// Cutting torque from phase voltages and currents, speed, the slow power meter and their noise.
 //
-// Composition, once a raw sample: FluxTorque (air-gap torque). Once a tick (1 ms):
-//   frequency:  psi_R = psi - L_sigma i;  w_psi = arg(psi_R conj psi_R,prev)/h, w_i likewise   (E100)
-//               w_e += (1 - exp(-h/15 ms)) (w_x - w_e), w_x = w_psi once it agrees, else w_i    (E101)
-//   speed:      measured, or without a sensor (w_psi - w_sl)/p, w_sl = 2 R_R T_m/(3 p |psi_R|^2) (E102)
-//   noise:      of speed and torque, measured in idle                                            (E103)
-//   load:       LoadTorqueFilter;  air, cut and tare: AirCut
-//   sigma:      (E104)
-// Source: ESTIMATOR prototype 1.2, 1.3; changes and derivations: EQUATIONS.md.
+// Once a raw sample: FluxTorque, the air-gap torque. Once a tick (1 ms):
+//   frequency  psi_R = psi - L_sigma i;  w_psi = arg(psi_R conj psi_R,prev)/h, w_i likewise   (E100)
+//              w_e += (1 - exp(-h/15 ms)) (w_x - w_e), w_x = w_psi once it agrees, else w_i    (E101)
+//   speed      measured less its ripple, or without a sensor
+//              (w_psi - w_sl)/p, w_sl = 2 R_R T_m / (3 p |psi_R|^2)                            (E102)
+//   noise      NoiseMeter (E103);  ripple  SpeedRipple (E105)
+//   torque     T' = T - dR (x - x_tare) + (g - 1)(P_i - P_i,tare) p / w_e      StatorResistance
+//              (E111), PowerScale (E122)
+//   load       LoadTorqueFilter (E70)-(E74);  inertia  RunUpInertia (E115)
+//   tare       AirCut (E90)-(E92)
+//   sigma      sum of squares of: filter or idle scatter, model floor 5e-4 T_n, 0.3 % of the
+//              torque, inertia, resistance, time stamp (change of this tick), tare              (E104)
+// Below 3 Hz stator frequency there is no estimate. Source: ESTIMATOR prototype 1; changes and
+// derivations in EQUATIONS.md.
 #pragma once
 
 #include <array>
@@ -18,32 +24,42 @@
 #include "estimator/air_cut.hpp"
 #include "estimator/flux_torque.hpp"
 #include "estimator/load_torque_filter.hpp"
+#include "estimator/noise_meter.hpp"
+#include "estimator/power_scale.hpp"
+#include "estimator/run_up_inertia.hpp"
 #include "estimator/space_vector.hpp"
+#include "estimator/speed_ripple.hpp"
+#include "estimator/stator_resistance.hpp"
 
 namespace cutforce::estimator {
 
 class FusedObserver {
  public:
-  enum class ConfigError : std::uint8_t { kFlux, kFilter, kAir, kMotor };
+  enum class ConfigError : std::uint8_t {
+    kFlux, kFilter, kAir, kInertia, kResistance, kMeter, kMotor
+  };
 
   struct Config {
     FluxTorque::Config flux;
     LoadTorqueFilter::Config filter;
     AirCut::Config air;
-    float rotor_resistance_ohm;     // star-equivalent, inverse-gamma
-    float leakage_inductance_h;     // star-equivalent, inverse-gamma
-    float rated_flux_v_s;           // about; decides only what is plausible
-    float inertia_sigma_ratio;
-    float stator_resistance_sigma_ohm;
-    bool sensorless;                // speed from the flux
+    RunUpInertia::Config inertia;
+    StatorResistance::Config resistance;
+    PowerScale::Config meter;
+    float leakage_inductance_h;      // star-equivalent, inverse-gamma
+    float rated_flux_v_s;            // about; decides only what is plausible
+    bool sensorless;                 // speed from the flux
+    bool track_resistance;
+    bool calibrate;                  // wait for the idle calibration before the first tare
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       if (!flux.check()) return std::unexpected{ConfigError::kFlux};
       if (!filter.check()) return std::unexpected{ConfigError::kFilter};
       if (!air.check()) return std::unexpected{ConfigError::kAir};
-      if (!(rotor_resistance_ohm > 0.0F && leakage_inductance_h >= 0.0F && rated_flux_v_s > 0.0F))
-        return std::unexpected{ConfigError::kMotor};
-      if (!(inertia_sigma_ratio >= 0.0F && stator_resistance_sigma_ohm >= 0.0F))
+      if (!inertia.check()) return std::unexpected{ConfigError::kInertia};
+      if (!resistance.check()) return std::unexpected{ConfigError::kResistance};
+      if (!meter.check()) return std::unexpected{ConfigError::kMeter};
+      if (!(leakage_inductance_h >= 0.0F && rated_flux_v_s > 0.0F))
         return std::unexpected{ConfigError::kMotor};
       return {};
     }
@@ -52,17 +68,19 @@ class FusedObserver {
   struct Sample {
     MotorSample motor;
     float speed_rad_s;
+    float power_meter_w;
     float elapsed_periods;
     bool speed_valid;
+    bool meter_valid;
   };
 
   struct Output {
     bool valid;                    // an estimate exists
-    bool steady;                   // speed and torque stand still: offsets can be measured
+    bool steady;                   // speed stands still: channel offsets can be measured
     bool calibrated;
     AirCut::Phase phase;
     float airgap_power_w;
-    float airgap_torque_nm;        // mean of the tick
+    float airgap_torque_nm;        // mean of the tick, corrected
     float load_torque_nm;          // after inertia
     float net_torque_nm;           // less nominal friction and tare: T_C + load friction
     float net_sigma_nm;
@@ -74,51 +92,32 @@ class FusedObserver {
     float duration_s;
   };
 
-  // Mean squares and products that tell the noise apart, (E103).
-  struct Differences {
-    float e0 = 0.0F;        // variance of the change of the speed that the torque leaves unexplained
-    float e1 = 0.0F;        // its covariance from tick to tick
-    float lagged = 0.0F;    // variance of the second difference over kLag ticks, /6: slow noise
-    float third_nm2 = 0.0F;   // third difference of the torque, /20
-    float second_nm2 = 0.0F;  // second difference of the torque that the speed leaves unexplained, /6
-  };
-
-  static constexpr std::size_t kLag = 8;  // ticks
-
-  struct Noise {
-    LoadTorqueFilter::Noise filter{};
-    std::array<float, 3> torque_nm{};        // last ticks, for differences
-    std::array<float, 2> unexplained_nm{};
-    float explained_rad_s = 0.0F;            // speed that the torque explains
-    std::array<float, 2 * kLag> residuals_rad_s{};  // the rest, a ring
-    float step_rad_s = 0.0F;                 // its last change
-    float last_speed_rad_s = 0.0F;
-    float last_moment_nm = 0.0F;
-    float slow_torque_nm = 0.0F;
-    Differences block{};                     // sums of the block of ticks that is being filled
-    Differences mean{};                      // of the blocks that count
-    float idle_s = 0.0F;
-    std::uint32_t filled = 0;                // ticks in the block
-    std::uint32_t blocks = 0;                // in the mean, at most kMostBlocks
-    std::uint32_t after_restart = 0;         // ticks since the rest began anew
-    std::uint32_t idle_measured = 0;
-  };
-
-  struct State {
-    FluxTorque::State flux;
-    LoadTorqueFilter::State filter;
-    AirCut::State air;
-    Noise noise{};
+  struct Tick {
     SpaceVector rotor_flux_v_s{};
     SpaceVector current_a{};
     float frequency_rad_s = 0.0F;
     float locked_s = 0.0F;
     float speed_sum_rad_s = 0.0F;
     std::uint32_t speed_count = 0;
+    float meter_w = 0.0F;
+    std::uint32_t meter_count = 0;
     float load_torque_nm = 0.0F;
-    float idle_current_a2 = 0.0F;
-    std::uint32_t ticks = 0;
+    float idle_copper = 0.0F;        // x of (E110) when the tare was taken
+    float idle_power_torque_nm = 0.0F;  // P_i p / w_e likewise
+    std::uint32_t ticks = 0;         // since the estimate became valid
     std::uint32_t calibrated = 0;
+  };
+
+  struct State {
+    FluxTorque::State flux;
+    LoadTorqueFilter::State filter;
+    AirCut::State air;
+    NoiseMeter::State noise;
+    SpeedRipple::State ripple;
+    RunUpInertia::State inertia;
+    StatorResistance::State resistance;
+    PowerScale::State meter;
+    Tick tick;
   };
 
   [[nodiscard]] static std::expected<FusedObserver, ConfigError> make(const Config& config) noexcept;
@@ -133,24 +132,39 @@ class FusedObserver {
   void restore(const State& state) noexcept;
 
  private:
-  FusedObserver(const Config& config, const FluxTorque& flux, const LoadTorqueFilter& filter,
-                const AirCut& air) noexcept;
+  explicit FusedObserver(const Config& config) noexcept;
+
   struct Rotation {
     float flux_rad_s;
     float current_rad_s;
     float flux_squared;
   };
+  struct Speed {
+    float mean_rad_s;
+    float samples;
+    bool valid;
+  };
   [[nodiscard]] Rotation rotation(const FluxTorque::Window& window) noexcept;
   void track_frequency(const Rotation& rotation, float duration_s) noexcept;
-  void measure_noise(const LoadTorqueFilter::Input& input, float centre_ratio, bool idle) noexcept;
-  void close_block(bool of_speed) noexcept;
-  void set_noise(float duration_s) noexcept;
+  [[nodiscard]] Speed take_speed(const Rotation& rotation, float torque_nm, bool locked,
+                                 float duration_s) noexcept;
+  [[nodiscard]] float correction_nm(const FluxTorque::Window& window, float copper) const noexcept;
+  void learn(const FluxTorque::Window& window, const Rotation& rotation, const Output& out,
+             float copper, float speed_rad_s) noexcept;
+  [[nodiscard]] float sigma_nm(const LoadTorqueFilter::Output& load, const AirCut::Output& air,
+                               float torque_nm, float copper, float change_nm) const noexcept;
+  [[nodiscard]] Output unlocked(float speed_rad_s, AirCut::Feed feed, Output out) noexcept;
 
   Config config_;
   FluxTorque flux_;
   LoadTorqueFilter filter_;
   AirCut air_;
-  State own_{};  // the parts' own states are kept in the parts
+  NoiseMeter noise_;
+  SpeedRipple ripple_{};
+  RunUpInertia inertia_;
+  StatorResistance resistance_;
+  PowerScale meter_;
+  Tick tick_{};
 };
 
 static_assert(std::is_trivially_copyable_v<FusedObserver>);

@@ -103,7 +103,7 @@ auto LoadTorqueFilter::step(const Input& input, const Noise& noise) noexcept -> 
     edge.mean[k] = q + into_edge * d;
   }
 
-  const float g = input.duration_s / config_.inertia_kg_m2;
+  const float g = input.duration_s / input.inertia_kg_m2;
   const float q_edge = config_.edge_slope_1_s * input.duration_s * config_.rated_torque_nm;
   const float q_quiet2 = config_.drift_1_sqrt_s * config_.drift_1_sqrt_s * input.duration_s *
                          config_.rated_torque_nm * config_.rated_torque_nm;

@@ -27,18 +27,16 @@ namespace cutforce::estimator {
 
 class LoadTorqueFilter {
  public:
-  enum class ConfigError : std::uint8_t { kPeriod, kInertia, kTorque, kSlope };
+  enum class ConfigError : std::uint8_t { kPeriod, kTorque, kSlope };
 
   struct Config {
     float tick_s;                  // nominal
-    float inertia_kg_m2;
     float rated_torque_nm;         // scales everything below
     float edge_slope_1_s;          // steepest slope to be followed, rated torques per second
     float drift_1_sqrt_s;          // drift in the cut, rated torques per root second
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       if (!(tick_s > 0.0F)) return std::unexpected{ConfigError::kPeriod};
-      if (!(inertia_kg_m2 > 0.0F)) return std::unexpected{ConfigError::kInertia};
       if (!(rated_torque_nm > 0.0F)) return std::unexpected{ConfigError::kTorque};
       if (!(edge_slope_1_s > 0.0F && drift_1_sqrt_s > 0.0F))
         return std::unexpected{ConfigError::kSlope};
@@ -58,6 +56,7 @@ class LoadTorqueFilter {
     float moment_nm;     // M
     float speed_rad_s;   // w_m
     float duration_s;    // of this tick
+    float inertia_kg_m2;
     bool speed_valid;    // false: predict only
   };
 

@@ -1,0 +1,74 @@
+// Inertia from the run-up before the first air cut.
+//
+//   J = integral(T - T_C - B w - b) dt / (w_end - w_start)                                  (E115)
+// over all accelerating time until the first tare b is known, then combined with the value given:
+// J' = J_0 + k (J - J_0), k = s_0^2 / (s_0^2 + s^2), s^2 = (error of T)^2 + (error of b t/dw)^2.
+// Only before the first cut, only over a change of speed worth measuring, and never further than
+// two of its own prior sigmas. Source: the integral of P3 (5); weights: EQUATIONS.md.
+#pragma once
+
+#include <cstdint>
+#include <expected>
+#include <type_traits>
+
+namespace cutforce::estimator {
+
+class RunUpInertia {
+ public:
+  enum class ConfigError : std::uint8_t { kInertia, kFriction };
+
+  struct Config {
+    float inertia_kg_m2;
+    float inertia_sigma_ratio;   // of the value given
+    float coulomb_torque_nm;
+    float viscous_nm_s_rad;
+    float rated_torque_nm;
+
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
+      if (!(inertia_kg_m2 > 0.0F && inertia_sigma_ratio >= 0.0F && rated_torque_nm > 0.0F))
+        return std::unexpected{ConfigError::kInertia};
+      if (!(coulomb_torque_nm >= 0.0F && viscous_nm_s_rad >= 0.0F))
+        return std::unexpected{ConfigError::kFriction};
+      return {};
+    }
+  };
+
+  struct Input {
+    float torque_nm;     // mean of the tick
+    float speed_rad_s;   // end of the tick, filtered
+    float duration_s;
+    bool valid;          // torque and speed can be told
+    bool tared;          // a tare is known: close
+    float tare_nm;
+  };
+
+  struct State {
+    float impulse_nm_s = 0.0F;  // of the torque less nominal friction
+    float gained_rad_s = 0.0F;
+    float time_s = 0.0F;
+    float last_speed_rad_s = 0.0F;
+    float inertia_kg_m2 = 0.0F;
+    float sigma_ratio = 0.0F;
+    std::uint32_t seen = 0;
+    std::uint32_t closed = 0;
+  };
+
+  [[nodiscard]] static std::expected<RunUpInertia, ConfigError> make(const Config& config) noexcept;
+  void step(const Input& input) noexcept;
+
+  [[nodiscard]] float inertia_kg_m2() const noexcept { return state_.inertia_kg_m2; }
+  [[nodiscard]] float sigma_ratio() const noexcept { return state_.sigma_ratio; }
+  [[nodiscard]] const State& state() const noexcept { return state_; }
+  void restore(const State& state) noexcept { state_ = state; }
+
+ private:
+  explicit RunUpInertia(const Config& config) noexcept;
+  void close(float tare_nm) noexcept;
+
+  Config config_;
+  State state_{};
+};
+
+static_assert(std::is_trivially_copyable_v<RunUpInertia>);
+
+}  // namespace cutforce::estimator

@@ -1,0 +1,107 @@
+#include "estimator/stator_resistance.hpp"
+
+#include <cmath>
+
+namespace cutforce::estimator {
+namespace {
+
+constexpr float kBlock_s = 0.05F;
+constexpr float kModelError_ratio = 0.006F;  // of flux, slip and torque together; does not average out
+constexpr float kModelCount = 20.0F;         // blocks that share that error
+constexpr float kSlipNoise_rad_s = 0.02F;    // of a block's mean
+constexpr float kSteady_ratio = 0.02F;       // torque may move by this much of rated within a block
+constexpr float kLargestChange_ratio = 0.5F;
+
+}  // namespace
+
+StatorResistance::StatorResistance(const Config& config) noexcept : config_(config) {
+  const float a = config.rotor_resistance_ohm / (1.5F * config.pole_pairs);
+  const float sa = config.rotor_sigma_ratio * a;
+  const float sr = a * config.resistance_sigma_ratio * config.stator_resistance_ohm;
+  const float sf = a * config.iron_torque_sigma_nm;
+  state_.mean = {a, 0.0F, 0.0F};
+  state_.covariance = {sa * sa, 0.0F, 0.0F, sr * sr, 0.0F, sf * sf};
+}
+
+auto StatorResistance::make(const Config& config) noexcept
+    -> std::expected<StatorResistance, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return StatorResistance{config};
+}
+
+void StatorResistance::step(const Input& in) noexcept {
+  auto& s = state_.sums;
+  const float moved = in.torque_nm - state_.first_torque_nm;
+  const float limit = kSteady_ratio * config_.rated_torque_nm;
+  if (!in.steady || moved > limit || moved < -limit) {
+    s.fill(0.0F);
+    state_.first_torque_nm = in.torque_nm;
+    if (!in.steady) return;
+  }
+  const float w = in.frequency_rad_s;
+  const float x = 1.5F * in.current_squared_a2 * config_.pole_pairs / (w > 1.0F || w < -1.0F ? w : 1.0F);
+  s[0] += in.flux_squared * in.duration_s;
+  s[1] += (in.flux_frequency_rad_s - config_.pole_pairs * in.speed_rad_s) * in.duration_s;
+  s[2] += in.torque_nm * in.duration_s;
+  s[3] += x * in.duration_s;
+  s[4] += in.duration_s;
+  if (s[4] >= kBlock_s) {
+    learn();
+    s.fill(0.0F);
+    state_.first_torque_nm = in.torque_nm;
+  }
+}
+
+void StatorResistance::learn() noexcept {
+  const auto& s = state_.sums;
+  const float torque = s[2] / s[4];
+  const float x = s[3] / s[4];
+  // The copper term must stand out of what the iron loss may be.
+  const float copper = config_.resistance_sigma_ratio * config_.stator_resistance_ohm * x;
+  if (!(copper > config_.iron_torque_sigma_nm)) return;
+
+  const float flux2 = s[0] / s[4];
+  const float y = flux2 * s[1] / s[4];
+  const float a = state_.mean[0];
+  const float slip_noise = flux2 * kSlipNoise_rad_s;
+  const float model = kModelError_ratio * a * (torque < 0.0F ? -torque : torque);
+  const float noise = slip_noise * slip_noise + kModelCount * model * model;
+  const std::array<float, 3> h{torque, -x, -1.0F};  // (E110)
+
+  auto& [p00, p01, p02, p11, p12, p22] = state_.covariance;
+  const float g0 = p00 * h[0] + p01 * h[1] + p02 * h[2];
+  const float g1 = p01 * h[0] + p11 * h[1] + p12 * h[2];
+  const float g2 = p02 * h[0] + p12 * h[1] + p22 * h[2];
+  const float variance = h[0] * g0 + h[1] * g1 + h[2] * g2 + noise;
+  if (!(variance > 0.0F)) return;
+  const float r = y - (h[0] * state_.mean[0] + h[1] * state_.mean[1] + h[2] * state_.mean[2]);
+  const float scale = 1.0F / variance;
+  state_.mean[0] += g0 * scale * r;
+  state_.mean[1] += g1 * scale * r;
+  state_.mean[2] += g2 * scale * r;
+  p00 -= g0 * g0 * scale;
+  p01 -= g0 * g1 * scale;
+  p02 -= g0 * g2 * scale;
+  p11 -= g1 * g1 * scale;
+  p12 -= g1 * g2 * scale;
+  p22 -= g2 * g2 * scale;
+  if (!(p00 > 0.0F)) p00 = 0.0F;
+  if (!(p11 > 0.0F)) p11 = 0.0F;
+  if (!(p22 > 0.0F)) p22 = 0.0F;
+}
+
+float StatorResistance::change_ohm() const noexcept {
+  const float a = state_.mean[0];
+  const float limit = kLargestChange_ratio * config_.stator_resistance_ohm;
+  if (!(a > 0.0F)) return 0.0F;
+  const float change = state_.mean[1] / a;
+  return change > limit ? limit : (change < -limit ? -limit : change);
+}
+
+float StatorResistance::change_sigma_ohm() const noexcept {
+  const float a = state_.mean[0];
+  return a > 0.0F ? std::sqrt(state_.covariance[3]) / a
+                  : config_.resistance_sigma_ratio * config_.stator_resistance_ohm;
+}
+
+}  // namespace cutforce::estimator

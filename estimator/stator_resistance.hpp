@@ -1,0 +1,84 @@
+// Stator resistance on line, from the consistency of slip and torque.
+//
+//   |psi_R|^2 w_sl = A T - (A dR) x - A T_fe,   x = 1.5 |i|^2 p / w_e,  A = R_R / (1.5 p)   (E110)
+// with w_sl = mean(w_psi) - p mean(w), T the torque computed with the resistance in use, dR the
+// true resistance less that, T_fe the torque of the iron loss. Means of 50 ms while torque and
+// speed stand still. Torque is the instrument, slip the measurement: slip is the noisy quantity.
+// Three states (A, A dR, A T_fe) in a Kalman filter without process noise but slow forgetting of
+// dR (temperature). The torque is corrected by
+//   T' = T - dR (x - x_tare)                                                                (E111)
+// only, so that the tare keeps continuity. Where the copper term is smaller than what the iron
+// loss may be, the value found is kept and nothing is learned.
+// Source: ESTIMATOR prototype 1.5; derivation in EQUATIONS.md.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <expected>
+#include <type_traits>
+
+namespace cutforce::estimator {
+
+class StatorResistance {
+ public:
+  enum class ConfigError : std::uint8_t { kMotor, kUncertainty };
+
+  struct Config {
+    float pole_pairs;
+    float stator_resistance_ohm;  // in use, star-equivalent
+    float resistance_sigma_ratio;
+    float rotor_resistance_ohm;
+    float rotor_sigma_ratio;
+    float rated_torque_nm;
+    float iron_torque_sigma_nm;   // small where the iron loss is declared
+
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
+      if (!(pole_pairs >= 1.0F && stator_resistance_ohm > 0.0F && rotor_resistance_ohm > 0.0F &&
+            rated_torque_nm > 0.0F))
+        return std::unexpected{ConfigError::kMotor};
+      if (!(resistance_sigma_ratio > 0.0F && rotor_sigma_ratio > 0.0F &&
+            iron_torque_sigma_nm > 0.0F))
+        return std::unexpected{ConfigError::kUncertainty};
+      return {};
+    }
+  };
+
+  struct Input {
+    float flux_squared;           // |psi_R|^2 with the resistance in use
+    float flux_frequency_rad_s;   // of this tick
+    float speed_rad_s;            // measured, mechanical
+    float frequency_rad_s;        // smoothed w_e
+    float torque_nm;
+    float current_squared_a2;
+    float duration_s;
+    bool steady;
+  };
+
+  struct State {
+    std::array<float, 3> mean{};
+    std::array<float, 6> covariance{};  // 00 01 02 11 12 22
+    std::array<float, 5> sums{};        // flux2, slip, torque, x, time
+    float first_torque_nm = 0.0F;
+  };
+
+  [[nodiscard]] static std::expected<StatorResistance, ConfigError> make(
+      const Config& config) noexcept;
+  void step(const Input& input) noexcept;
+
+  [[nodiscard]] float change_ohm() const noexcept;        // dR, within +-50 %
+  [[nodiscard]] float change_sigma_ohm() const noexcept;
+
+  [[nodiscard]] const State& state() const noexcept { return state_; }
+  void restore(const State& state) noexcept { state_ = state; }
+
+ private:
+  explicit StatorResistance(const Config& config) noexcept;
+  void learn() noexcept;
+
+  Config config_;
+  State state_{};
+};
+
+static_assert(std::is_trivially_copyable_v<StatorResistance>);
+
+}  // namespace cutforce::estimator
