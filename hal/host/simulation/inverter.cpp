@@ -31,7 +31,12 @@ Complex Inverter::drop_v(Complex current_a) const noexcept {
                       -config_.device_drop_v * sign(i[2])});  // (S17)
 }
 
+Complex Inverter::ideal_v(const std::array<double, 3>& duty) const noexcept {
+  return config_.dc_link_v * from_phases(duty);
+}
+
 Complex Inverter::mean_v(const std::array<double, 3>& duty, Complex current_a) const noexcept {
+  if (!(config_.dead_time_s > 0.0 || config_.device_drop_v > 0.0)) return ideal_v(duty);
   auto level_v = duty;
   const auto i = to_phases(current_a);
   // One of the two edges of a carrier period is late by the dead time, (S16).

@@ -32,7 +32,9 @@ class Inverter {
 
   // Duty of each phase for a wanted voltage, clipped to 0..1 (overmodulation).
   [[nodiscard]] std::array<double, 3> duties(Complex wanted_v) const noexcept;
-  // Mean voltage of a hold with these duties while the line currents have these signs.
+  // Mean voltage of a hold with these duties: without dead time and drops, and with them
+  // while the line currents have these signs.
+  [[nodiscard]] Complex ideal_v(const std::array<double, 3>& duty) const noexcept;
   [[nodiscard]] Complex mean_v(const std::array<double, 3>& duty, Complex current_a) const noexcept;
 
   // Switched only: plans the edges of a hold that begins now.

@@ -35,14 +35,15 @@ SpeedSensor::SpeedSensor(const SpeedSensorConfig& config, double sample_s, std::
       counts_(whole_steps(config.encoder_window_s, sample_s, 1), 0.0) {}
 
 double SpeedSensor::read(double speed_rad_s, double angle_rad) noexcept {
-  const auto [sine, cosine] = sine_cosine(angle_rad);
-  double measured = 0.0;
+  const bool ripples = config_.ripple_ratio != 0.0 || config_.second_ripple_ratio != 0.0;
+  const auto [sine, cosine] = ripples ? sine_cosine(angle_rad) : SineCosine{0.0, 1.0};
+  double measured = speed_rad_s;
   if (config_.encoder_counts > 0.0) {
     const double seen_rad = angle_rad + config_.ripple_ratio * sine +
                             config_.second_ripple_ratio * sine * cosine;
     const double count = std::floor(seen_rad * config_.encoder_counts / kTwoPi);
     measured = (count - counts_.push(count)) * kTwoPi / config_.encoder_counts / window_s_;
-  } else {
+  } else if (ripples) {
     measured = speed_rad_s * (1.0 + config_.ripple_ratio * cosine +
                               config_.second_ripple_ratio * (cosine * cosine - sine * sine));
   }

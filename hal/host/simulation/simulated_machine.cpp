@@ -122,9 +122,7 @@ void SimulatedMachine::control() noexcept {
                                         .rotor_flux_vs = state_.flux.rotor_vs,
                                         .speed_rad_s = state_.speed_rad_s});
   after_.duty = inverter_.duties(wanted_v);
-  const double link_v = config_.inverter.dc_link_v;
-  after_.reference_v =
-      from_phases({link_v * after_.duty[0], link_v * after_.duty[1], link_v * after_.duty[2]});
+  after_.reference_v = inverter_.ideal_v(after_.duty);
   after_.mean_v = inverter_.mean_v(after_.duty, at.line_current_a);
   drive_.realised(after_.reference_v);
   step_cut(time_s);
