@@ -70,7 +70,7 @@ SimulatedMachineConfig motor_b() {
 SimulatedMachineConfig default_lathe() {
   const MotorConfig motor{.pole_pairs = 2.0,
                           .stator_resistance_ohm = 0.25,  // 0.75 in each delta phase
-                          .rotor_resistance_ohm = 0.305,
+                          .rotor_resistance_ohm = 0.265,
                           .leakage_inductance_h = 3.0e-3,
                           .stator_inductance_h = 38.4e-3,
                           .saturation_1_vs = 1.68,
