@@ -47,5 +47,3 @@ BENCHMARK(switched_motor_a);
 
 }  // namespace
 }  // namespace cutforce
-
-BENCHMARK_MAIN();
