@@ -2,11 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cmath>
 #include <cstring>
-#include <memory>
-#include <set>
+#include <filesystem>
+#include <fstream>
+#include <string>
 
 #include "hal/host/simulation/arithmetic.hpp"
 #include "hal/host/simulation/simulation_port.hpp"
@@ -431,6 +432,19 @@ TEST(SimulationPort, ClosesTheLoopOnTheForce) {
   EXPECT_LT(highest, 760.0);  // ... and answered
   EXPECT_GT(lowest, 400.0);
   EXPECT_NEAR(machine.truth().override_pct, override_pct, 1.0);
+}
+
+TEST(SimulatedMachine, WritesRecordings) {
+  const auto path = std::filesystem::temp_directory_path() / "cutforce_simulated_recording.csv";
+  host_tests::write_recording(default_lathe(), 0.01, path);
+  std::ifstream file(path);
+  std::string line;
+  ASSERT_TRUE(std::getline(file, line));
+  EXPECT_EQ(line, "# cutforce recording 1");
+  int rows = 0;
+  while (std::getline(file, line)) rows += line[0] >= '0' && line[0] <= '9';
+  EXPECT_EQ(rows, 51);
+  std::filesystem::remove(path);
 }
 
 TEST(SimulatedMachine, ShowsNoTruthInItsSamples) {

@@ -1,10 +1,10 @@
 // Every defect does what it says, and nothing else.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
-#include <string>
 
 #include "hal/host/simulation/arithmetic.hpp"
 #include "support/simulation_support.hpp"

@@ -24,8 +24,12 @@ void run(benchmark::State& state, const SimulatedMachineConfig& config) {
 
 SimulatedMachineConfig noisy_lathe() {
   SimulatedMachineConfig config = hal::host::default_lathe();
-  for (auto& channel : config.sensors.voltage) channel = {.noise = 1.0, .range = 400.0, .bits = 12.0};
-  for (auto& channel : config.sensors.current) channel = {.noise = 0.1, .range = 100.0, .bits = 12.0};
+  for (auto& channel : config.sensors.voltage) {
+    channel = {.noise = 1.0, .range = 400.0, .bits = 12.0};
+  }
+  for (auto& channel : config.sensors.current) {
+    channel = {.noise = 0.1, .range = 100.0, .bits = 12.0};
+  }
   config.sensors.speed.noise_rad_s = 0.05;
   return config;
 }

@@ -58,7 +58,7 @@ void CuttingProcess::step(const ProcessInput& input) noexcept {
   double torque_nm = plain_load_nm(input.time_s);
   state_.diameter_m = diameter_.value(process_.diameter_m, input.position_m);
   if (process_.specific_force_n_m2 > 0.0) {
-    state_.force_n += lag_share_ * (static_force_n(input) - state_.force_n);  // (S31)
+    state_.force_n = lagged(state_.force_n, static_force_n(input), lag_share_);  // (S31)
     torque_nm += state_.force_n * 0.5 * state_.diameter_m / gear_ratio_;      // (S32)
   } else {
     state_.force_n = torque_nm * gear_ratio_ / (0.5 * state_.diameter_m);

@@ -38,7 +38,7 @@ void FeedServo::step(double time_s, double spindle_turns_s) noexcept {
   // Exact for a constant command over the period, (S29).
   const double gap_m_s = state_.feed_m_s - wanted_m_s;
   state_.position_m += wanted_m_s * period_s_ + gap_m_s * config_.lag_s * lag_share_;
-  state_.feed_m_s = wanted_m_s + gap_m_s * (1.0 - lag_share_);
+  state_.feed_m_s = lagged(state_.feed_m_s, wanted_m_s, lag_share_);
 }
 
 }  // namespace cutforce::hal::host

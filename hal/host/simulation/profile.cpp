@@ -14,7 +14,7 @@ bool Profile::sound() const noexcept {
   return true;
 }
 
-double ProfileCursor::value(const Profile& profile, double at) noexcept {
+double ProfileCursor::between(const Profile& profile, double at) noexcept {
   const auto& points = profile.points();
   while (next_ < points.size() && points[next_].at <= at) ++next_;
   while (next_ > 0 && points[next_ - 1].at > at) --next_;

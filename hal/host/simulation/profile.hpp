@@ -33,9 +33,14 @@ class Profile {
 // Reads a profile whose abscissa mostly grows: remembers where it was, so a step costs O(1).
 class ProfileCursor {
  public:
-  [[nodiscard]] double value(const Profile& profile, double at) noexcept;
+  [[nodiscard]] double value(const Profile& profile, double at) noexcept {
+    if (profile.points().size() == 1) return profile.points().front().value;
+    return between(profile, at);
+  }
 
  private:
+  [[nodiscard]] double between(const Profile& profile, double at) noexcept;
+
   std::size_t next_ = 0;  // first point with abscissa > the last question
 };
 

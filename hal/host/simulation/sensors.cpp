@@ -47,7 +47,7 @@ double SpeedSensor::read(double speed_rad_s, double angle_rad) noexcept {
     measured = speed_rad_s * (1.0 + config_.ripple_ratio * cosine +
                               config_.second_ripple_ratio * (cosine * cosine - sine * sine));
   }
-  lagged_rad_s_ += lag_share_ * (measured - lagged_rad_s_);
+  lagged_rad_s_ = lagged(lagged_rad_s_, measured, lag_share_);
   if (!(config_.noise_rad_s > 0.0)) return lagged_rad_s_;
   return lagged_rad_s_ + config_.noise_rad_s * random_.normal();
 }
@@ -65,7 +65,7 @@ void PowerMeter::step(double power_w) noexcept {
   const double mean_w = sum_w_ / count_;
   sum_w_ = 0.0;
   count_ = 0;
-  lagged_w_ += lag_share_ * (dead_time_.push(mean_w) - lagged_w_);
+  lagged_w_ = lagged(lagged_w_, dead_time_.push(mean_w), lag_share_);
   output_w_ = config_.scale * lagged_w_ + config_.offset_w;
   if (config_.noise_w > 0.0) output_w_ += config_.noise_w * random_.normal();
 }

@@ -122,7 +122,7 @@ class Dynamometer {
   Dynamometer(const DynamometerConfig& config, double sample_s, std::uint64_t seed) noexcept
       : config_(config), lag_share_(lag_share(sample_s, config.lag_s)), random_(seed, 30) {}
   [[nodiscard]] double read(double force_n) noexcept {
-    lagged_n_ += lag_share_ * (force_n - lagged_n_);
+    lagged_n_ = lagged(lagged_n_, force_n, lag_share_);
     const double noise_n = config_.noise_n > 0.0 ? config_.noise_n * random_.normal() : 0.0;
     return config_.gain * lagged_n_ + config_.offset_n + noise_n;  // (S39)
   }

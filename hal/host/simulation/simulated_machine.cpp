@@ -19,7 +19,26 @@ double longest_step(const SimulatedMachineConfig& config) noexcept {
 
 std::array<Channel, 3> channels(const std::array<ChannelConfig, 3>& c, std::uint64_t seed,
                                 std::uint64_t first) noexcept {
-  return {Channel{c[0], seed, first}, Channel{c[1], seed, first + 1}, Channel{c[2], seed, first + 2}};
+  return {Channel{c[0], seed, first}, Channel{c[1], seed, first + 1},
+          Channel{c[2], seed, first + 2}};
+}
+
+// What every sample carries.
+std::uint32_t presence(const SensorConfig& s) noexcept {
+  std::uint32_t present = bit(Signal::kVoltageU) | bit(Signal::kVoltageV) |
+                          bit(Signal::kVoltageW) | bit(Signal::kCurrentU) | bit(Signal::kCurrentV);
+  const auto add = [&present](bool there, Signal signal) {
+    if (there) present |= bit(signal);
+  };
+  add(s.current_w_present, Signal::kCurrentW);
+  add(s.speed.present, Signal::kSpeed);
+  add(s.power_meter.present, Signal::kPowerMeter);
+  add(s.dynamometer.present, Signal::kMeasuredForce);
+  add(s.feed_active_present, Signal::kFeedActive);
+  add(s.override_applied_present, Signal::kOverrideApplied);
+  add(s.diameter_present, Signal::kWorkpieceDiameter);
+  add(s.feed_rate_present, Signal::kFeedRate);
+  return present;
 }
 
 }  // namespace
@@ -48,7 +67,8 @@ SimulatedMachine::SimulatedMachine(const SimulatedMachineConfig& config)
       speed_sensor_(config.sensors.speed, sample_s_, config.seed),
       power_meter_(config.sensors.power_meter, hold_s_, config.seed),
       dynamometer_(config.sensors.dynamometer, sample_s_, config.seed),
-      faults_(config.faults) {}
+      faults_(config.faults),
+      present_(presence(config.sensors)) {}
 
 std::int64_t SimulatedMachine::sample_time_ns(std::int64_t index) const noexcept {
   return static_cast<std::int64_t>(
@@ -150,7 +170,8 @@ Complex SimulatedMachine::voltage_signal() const noexcept {
     case VoltageSignal::kMean: break;
   }
   // Half a hold to either side; the hold to come is known, for the drive has computed it, (S15).
-  const double share = static_cast<double>(now_ns_ - hold_begin_ns_) / static_cast<double>(hold_ns_);
+  const double share =
+      static_cast<double>(now_ns_ - hold_begin_ns_) / static_cast<double>(hold_ns_);
   if (share < 0.5) return (0.5 - share) * before_.mean_v + (0.5 + share) * hold_.mean_v;
   return (1.5 - share) * hold_.mean_v + (share - 0.5) * after_.mean_v;
 }
@@ -166,24 +187,6 @@ void SimulatedMachine::read_voltages() noexcept {
   has_voltages_ = true;
 }
 
-std::uint32_t SimulatedMachine::presence() const noexcept {
-  const SensorConfig& s = config_.sensors;
-  std::uint32_t present = bit(Signal::kVoltageU) | bit(Signal::kVoltageV) |
-                          bit(Signal::kVoltageW) | bit(Signal::kCurrentU) | bit(Signal::kCurrentV);
-  const auto add = [&present](bool there, Signal signal) {
-    if (there) present |= bit(signal);
-  };
-  add(s.current_w_present, Signal::kCurrentW);
-  add(s.speed.present, Signal::kSpeed);
-  add(s.power_meter.present, Signal::kPowerMeter);
-  add(s.dynamometer.present, Signal::kMeasuredForce);
-  add(s.feed_active_present, Signal::kFeedActive);
-  add(s.override_applied_present, Signal::kOverrideApplied);
-  add(s.diameter_present, Signal::kWorkpieceDiameter);
-  add(s.feed_rate_present, Signal::kFeedRate);
-  return present;
-}
-
 void SimulatedMachine::read_currents_and_rest() noexcept {
   const MotorInstant at = plant_.instant(state_, input_);
   const bool filtered = config_.inverter.anti_alias_hz > 0.0;
@@ -197,7 +200,7 @@ void SimulatedMachine::read_currents_and_rest() noexcept {
   const auto& feed = feed_.state();
   const bool cutting_move =
       feed.feeding && feed.position_m >= config_.feed.cutting_move_start_m;
-  sample_.present = presence();
+  sample_.present = present_;
   const auto put = [this](Signal signal, double value) {
     value_of(sample_, signal) = sample_.has(signal) ? static_cast<float>(value) : 0.0F;
   };

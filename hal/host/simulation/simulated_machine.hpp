@@ -67,7 +67,6 @@ class SimulatedMachine {
   void read_currents_and_rest() noexcept;
   void note_truth(const MotorInstant& at) noexcept;
   [[nodiscard]] std::int64_t sample_time_ns(std::int64_t index) const noexcept;
-  [[nodiscard]] std::uint32_t presence() const noexcept;
 
   SimulatedMachineConfig config_;
   std::int64_t hold_ns_;
@@ -90,6 +89,7 @@ class SimulatedMachine {
   PowerMeter power_meter_;
   Dynamometer dynamometer_;
   SignalFaults faults_;
+  std::uint32_t present_;
 
   Hold before_{}, hold_{}, after_{};
   double energy_j_ = 0.0;     // into the motor since the hold began
