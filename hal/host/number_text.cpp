@@ -75,7 +75,7 @@ CellState read_decimal(std::string_view text, Decimal& decimal) noexcept {
   if (at == end) return CellState::kValue;
   if (*at != 'e' && *at != 'E') return CellState::kNotANumber;
   ++at;
-  if (at != end && *at == '+') ++at;
+  if (end - at > 1 && *at == '+' && is_digit(at[1])) ++at;
   int exponent = 0;
   const auto [stop, error] = std::from_chars(at, end, exponent);
   if (error == std::errc::result_out_of_range) return CellState::kOutOfRange;

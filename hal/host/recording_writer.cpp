@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cassert>
+#include <charconv>
+#include <cmath>
 #include <cstring>
 #include <string>
 #include <string_view>
@@ -66,18 +68,21 @@ std::expected<void, InputError> write_header(TextRows& rows, std::span<const Met
   return rows.line(names);
 }
 
-// Text in units of which a metre has many: the shortest that reads back as the same float.
+// In other units than it is stored in: the shortest text that reads back as the same float.
 void put_scaled(TextRows& rows, float value, double units_per_si) {
+  if (!std::isfinite(value)) return rows.empty();
+  constexpr int kFirstDigits = 6;
+  constexpr int kLastDigits = 17;
   const double exact = static_cast<double>(value) * units_per_si;
-  const float rounded = static_cast<float>(exact);
-  // As the reader reads it: the shortest text of `rounded` as a double, then divided.
   char text[kMaxNumberChars];
-  if (std::isfinite(rounded)) {
-    const char* const end = write_number(text, rounded);
+  for (int digits = kFirstDigits; digits <= kLastDigits; ++digits) {
+    const char* const end =
+        std::to_chars(text, text + kMaxNumberChars, exact, std::chars_format::general, digits).ptr;
     const auto read = read_number<double>(text, end);
-    if (static_cast<float>(read.value / units_per_si) == value) return rows.number(rounded);
+    if (digits == kLastDigits || static_cast<float>(read.value / units_per_si) == value) {
+      return rows.text({text, static_cast<std::size_t>(end - text)});
+    }
   }
-  rows.number(exact);
 }
 
 }  // namespace
