@@ -9,6 +9,8 @@
 #include <string>
 #include <string_view>
 
+#include "hal/host/plain_text.hpp"
+
 namespace cutforce {
 namespace {
 

@@ -242,7 +242,7 @@ std::vector<Refusal> refused_rows() {
       {"few cells", row("0.002,1,2,3\n"), ":5:12", "4 cells where the header names 6"},
       {"cut last row", row("0.002,1,2"), ":5:10", "3 cells"},
       {"many cells", row("0.002,1,2,3,4,5,6\n"), ":5:16", "7 cells"},
-      {"junk", row(std::string("0.002,1,\0\xFF,3,4,5\n", 19)), ":5:9", "v_vn_v"},
+      {"junk", row(std::string("0.002,1,\0\xFF,3,4,5\n", 17)), ":5:9", "v_vn_v"},
       {"empty line", row("\n0.002,1,2,3,4,5\n"), ":5:1", "line is empty"},
       {"comment between rows", row("# later\n"), ":5:1", "t_s"},
       {"long line", row(std::string(70'000, '1') + "\n"), ":5:65537", "64 KiB"},

@@ -8,6 +8,7 @@
 #include "estimator/fault.hpp"
 #include "hal/host/byte_source.hpp"
 #include "hal/host/number_text.hpp"
+#include "hal/host/plain_text.hpp"
 #include "hal/host/table_header.hpp"
 
 namespace cutforce::firmware::host {

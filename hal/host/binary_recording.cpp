@@ -6,7 +6,9 @@
 #include <utility>
 
 #include "hal/host/binary_bytes.hpp"
+#include "hal/host/binary_parts.hpp"
 #include "hal/host/number_text.hpp"
+#include "hal/host/plain_text.hpp"
 
 namespace cutforce::hal::host {
 namespace {
@@ -15,75 +17,6 @@ constexpr std::uint32_t kVersion = 1;
 constexpr std::uint32_t kMaxRows = 65536;
 constexpr std::uint32_t kMaxHeaderBytes = std::uint32_t{16}
                                           << 20U;  // a damaged length asks no more
-constexpr std::size_t kPrefixBytes = 2 * sizeof(std::uint32_t);
-constexpr std::size_t kCrcBytes = sizeof(std::uint32_t);
-constexpr const char* kMakeAgain = "make the file again from the CSV recording";
-
-struct Part {
-  std::uint32_t first;    // version, or rows
-  std::string_view body;  // valid until the next part
-};
-
-// Parts with their CRC checked, and how far the file was read.
-class PartReader {
- public:
-  explicit PartReader(ByteSource source) : source_(std::move(source)) {}
-
-  std::expected<Part, InputError> next(std::uint32_t max_body_bytes) {
-    part_at_ = offset_;
-    buffer_.resize(kPrefixBytes);
-    if (auto got = take(0); !got) return std::unexpected{got.error()};
-    const auto first = number_at(0);
-    const auto length = number_at(sizeof(std::uint32_t));
-    if (length > max_body_bytes) return refused("the length of a part is damaged");
-    buffer_.resize(kPrefixBytes + length + kCrcBytes);
-    if (auto got = take(kPrefixBytes); !got) return std::unexpected{got.error()};
-    const std::string_view checked(buffer_.data(), kPrefixBytes + length);
-    if (crc_of(checked) != number_at(checked.size())) return refused("the check sum is wrong");
-    return Part{.first = first, .body = checked.substr(kPrefixBytes)};
-  }
-
-  // Fails iff anything follows.
-  std::expected<void, InputError> end() {
-    char more = 0;
-    const auto count = source_.read(std::span(&more, 1));
-    if (!count) return refused(count.error().what);
-    if (*count != 0) return refused("something follows the end");
-    return {};
-  }
-
-  std::unexpected<InputError> refused(std::string what, std::string remedy = kMakeAgain) const {
-    return std::unexpected{InputError{.where = name() + ":byte " + std::to_string(part_at_),
-                                      .what = std::move(what),
-                                      .remedy = std::move(remedy)}};
-  }
-
-  [[nodiscard]] const std::string& name() const noexcept { return source_.name(); }
-
- private:
-  // Fills the buffer from this index on.
-  std::expected<void, InputError> take(std::size_t from) {
-    while (from < buffer_.size()) {
-      const auto count = source_.read(std::span(buffer_).subspan(from));
-      if (!count) return refused(count.error().what, count.error().remedy);
-      if (*count == 0) return refused("the file ends before its end mark");
-      from += *count;
-      offset_ += *count;
-    }
-    return {};
-  }
-
-  [[nodiscard]] std::uint32_t number_at(std::size_t index) const {
-    std::uint32_t value = 0;
-    std::memcpy(&value, buffer_.data() + index, sizeof value);
-    return value;
-  }
-
-  ByteSource source_;
-  std::vector<char> buffer_;
-  std::uint64_t offset_ = kBinaryMagic.size();
-  std::uint64_t part_at_ = kBinaryMagic.size();
-};
 
 // The values of one column in the current block.
 struct Values {
@@ -93,7 +26,7 @@ struct Values {
 
 class BinaryRows final : public RowSource {
  public:
-  BinaryRows(PartReader parts, RecordingInfo info, std::vector<Column> columns)
+  BinaryRows(BinaryParts parts, RecordingInfo info, std::vector<Column> columns)
       : parts_(std::move(parts)),
         info_(std::move(info)),
         columns_(std::move(columns)),
@@ -230,7 +163,7 @@ class BinaryRows final : public RowSource {
     }
   }
 
-  PartReader parts_;
+  BinaryParts parts_;
   RecordingInfo info_;
   std::vector<Column> columns_;
   std::vector<Values> values_;  // one for each column
@@ -271,7 +204,7 @@ bool read_header(std::string_view body, RecordingInfo& info) {
 auto open_binary_recording(ByteSource source)
     -> std::expected<std::unique_ptr<RowSource>, InputError> {
   constexpr std::size_t kMaxColumns = 256;
-  PartReader parts(std::move(source));
+  BinaryParts parts(std::move(source), kBinaryMagic.size());
   const auto part = parts.next(kMaxHeaderBytes);
   if (!part) return std::unexpected{part.error()};
   if (part->first != kVersion) {

@@ -8,7 +8,6 @@
 #include <cstring>
 #include <optional>
 #include <utility>
-#include <vector>
 
 namespace cutforce::hal::host {
 namespace {
@@ -35,7 +34,7 @@ ByteError gzip_error(const std::string& why) {
 struct ByteSource::Impl {
   std::string name;
   std::unique_ptr<std::FILE, CloseFile> file;
-  std::vector<char> raw = std::vector<char>(kRawBytes);
+  std::unique_ptr<char[]> raw = std::make_unique_for_overwrite<char[]>(kRawBytes);
   std::size_t raw_begin = 0;
   std::size_t raw_end = 0;
   std::string front;  // read ahead by skip(), not yet delivered
@@ -60,7 +59,7 @@ struct ByteSource::Impl {
   }
 
   std::expected<void, ByteError> refill() {
-    const auto count = read_file(raw);
+    const auto count = read_file({raw.get(), kRawBytes});
     if (!count) return std::unexpected{count.error()};
     raw_begin = 0;
     raw_end = *count;
@@ -74,7 +73,7 @@ struct ByteSource::Impl {
   std::expected<std::size_t, ByteError> read_plain(std::span<char> out) {
     if (raw_begin == raw_end) return read_file(out);
     const std::size_t count = std::min(out.size(), raw_end - raw_begin);
-    std::memcpy(out.data(), raw.data() + raw_begin, count);
+    std::memcpy(out.data(), raw.get() + raw_begin, count);
     raw_begin += count;
     return count;
   }
@@ -121,7 +120,7 @@ struct ByteSource::Impl {
   }
 
   std::expected<std::size_t, ByteError> inflate_into(std::span<char> out) {
-    stream.next_in = reinterpret_cast<Bytef*>(raw.data() + raw_begin);
+    stream.next_in = reinterpret_cast<Bytef*>(raw.get() + raw_begin);
     stream.avail_in = static_cast<uInt>(raw_end - raw_begin);
     stream.next_out = reinterpret_cast<Bytef*>(out.data());
     stream.avail_out = static_cast<uInt>(out.size());

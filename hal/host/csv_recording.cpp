@@ -7,6 +7,7 @@
 
 #include "hal/host/line_reader.hpp"
 #include "hal/host/number_text.hpp"
+#include "hal/host/plain_text.hpp"
 #include "hal/host/table_header.hpp"
 
 namespace cutforce::hal::host {

@@ -18,13 +18,14 @@ InputError error_at(const std::string& file, std::size_t line, std::size_t colum
           .remedy = std::move(remedy)};
 }
 
-LineReader::LineReader(ByteSource source) : source_(std::move(source)), buffer_(kBufferBytes) {}
+LineReader::LineReader(ByteSource source)
+    : source_(std::move(source)), buffer_(std::make_unique_for_overwrite<char[]>(kBufferBytes)) {}
 
 auto LineReader::next() -> Status {
   if (failed_) return Status::kError;
   while (true) {
     const std::size_t available = end_ - begin_;
-    const char* const first = buffer_.data() + begin_;
+    const char* const first = buffer_.get() + begin_;
     if (available > 0) {
       if (const void* found = std::memchr(first, '\n', available); found != nullptr) {
         return take(static_cast<std::size_t>(static_cast<const char*>(found) - first), 1);
@@ -38,7 +39,7 @@ auto LineReader::next() -> Status {
 }
 
 auto LineReader::take(std::size_t length, std::size_t ending) -> Status {
-  const char* const first = buffer_.data() + begin_;
+  const char* const first = buffer_.get() + begin_;
   std::size_t kept = length;
   if (kept > 0 && first[kept - 1] == '\r') --kept;
   if (kept > kMaxLineBytes) return too_long();
@@ -50,10 +51,10 @@ auto LineReader::take(std::size_t length, std::size_t ending) -> Status {
 
 auto LineReader::fill() -> Status {
   const std::size_t kept = end_ - begin_;
-  std::memmove(buffer_.data(), buffer_.data() + begin_, kept);
+  std::memmove(buffer_.get(), buffer_.get() + begin_, kept);
   begin_ = 0;
   end_ = kept;
-  auto count = source_.read(std::span(buffer_).subspan(kept));
+  auto count = source_.read({buffer_.get() + kept, kBufferBytes - kept});
   if (!count) {
     failed_ = true;
     error_ = error_at(name(), number_ + 1, kept + 1, std::move(count.error().what),

@@ -5,9 +5,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "hal/host/byte_source.hpp"
 #include "hal/host/input_error.hpp"
@@ -41,7 +41,7 @@ class LineReader {
   Status too_long();
 
   ByteSource source_;
-  std::vector<char> buffer_;
+  std::unique_ptr<char[]> buffer_;  // untouched pages cost nothing: many recordings are short
   std::size_t begin_ = 0;
   std::size_t end_ = 0;
   bool ended_ = false;

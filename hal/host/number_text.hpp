@@ -6,7 +6,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <string>
 #include <string_view>
 #include <system_error>
 
@@ -81,15 +80,5 @@ inline constexpr int kMaxNumberChars = 32;
 // The shortest text that reads back as the same value. `value` is finite.
 [[nodiscard]] char* write_number(char* out, float value) noexcept;
 [[nodiscard]] char* write_number(char* out, double value) noexcept;
-
-// Index of the first byte that is no part of UTF-8 text (control characters other than tab
-// included), or npos.
-[[nodiscard]] std::size_t find_non_text(std::string_view bytes) noexcept;
-
-// In quotes, cut to a length that a person reads at a glance; what is no text is left out.
-[[nodiscard]] std::string in_quotes(std::string_view text);
-
-// Without spaces, tabs and carriage returns at both ends.
-[[nodiscard]] std::string_view trimmed(std::string_view text) noexcept;
 
 }  // namespace cutforce::hal::host

@@ -9,6 +9,7 @@
 #include "hal/host/csv_recording.hpp"
 #include "hal/host/line_reader.hpp"
 #include "hal/host/number_text.hpp"
+#include "hal/host/plain_text.hpp"
 
 namespace cutforce::hal::host {
 namespace {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "hal/host/number_text.hpp"
+#include "hal/host/plain_text.hpp"
 
 namespace cutforce::hal::host {
 namespace {

@@ -29,7 +29,10 @@ class ScratchFolder {
   [[nodiscard]] std::filesystem::path file(std::string_view name) const { return path_ / name; }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
+  // Anew each time: ext4 flushes a file to disk that is written over, and a test may do that
+  // thousands of times.
   std::filesystem::path write(std::string_view name, std::string_view bytes) const {
+    std::filesystem::remove(file(name));
     std::ofstream(file(name), std::ios::binary) << bytes;
     return file(name);
   }
