@@ -1,11 +1,13 @@
 // Every parameter of one machine, as plain numbers in SI units. The table in parameter_table.hpp
 // describes each of them (name, unit, range, default, sentence); a TOML file, the metadata of a
 // recording, or a constexpr initialiser fills them; configuration.hpp turns them into the checked
-// configs of the blocks. A length named 0 and a value marked "0: derived" mean "not given".
+// configs of the blocks. What is marked "0: derived" or "0: not given" may be 0 in a file; the
+// first kind rating.hpp fills before anything is made.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <type_traits>
 
 namespace cutforce::firmware {
 
@@ -60,7 +62,9 @@ struct Machine {
   bool iron_loss_declared;     // false: unknown, iron_loss_w is 0
   float rated_power_w;
   float rated_torque_nm;      // 0: derived
-  float rated_current_a_rms;  // 0: derived
+  float rated_speed_rad_s;    // at the shaft; 0: derived
+  float rated_voltage_v_rms;  // line to line; 0: derived
+  float rated_current_a_rms;  // line current; 0: derived
   float rated_frequency_hz;   // 0: derived from power and torque
   float inertia_kg_m2;        // all that turns, seen from the motor
   float inertia_sigma_ratio;
@@ -113,6 +117,9 @@ struct Machine {
   float slew_down_pct_s;
   float cut_threshold_n;  // above it the tool is in the cut
   OverrideCode override_code;
+
+  friend constexpr bool operator==(const Machine&, const Machine&) noexcept = default;
 };
+static_assert(std::is_trivially_copyable_v<Machine>);
 
 }  // namespace cutforce::firmware

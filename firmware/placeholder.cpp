@@ -1,1 +1,0 @@
-#include "firmware/machine.hpp"
