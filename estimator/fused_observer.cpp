@@ -120,7 +120,9 @@ void FusedObserver::track_frequency(const Rotation& r, float duration_s) noexcep
                            magnitude(r.current_rad_s - w) < 0.5F * size + 60.0F;
   const float seen = flux_agrees ? r.flux_rad_s : r.current_rad_s;
   const float share = 1.0F - exp_bounded(-duration_s / kFrequencyTime_s);
-  tick_.frequency_rad_s += share * (seen - w);  // (E101)
+  const float off = seen - w - tick_.acceleration_rad_s2 * duration_s;
+  tick_.frequency_rad_s = seen - (1.0F - share) * off;  // (E101)
+  tick_.acceleration_rad_s2 += 0.25F * share * share * off / duration_s;
   flux_.set_frequency(tick_.frequency_rad_s);
 
   const float now = magnitude(tick_.frequency_rad_s);

@@ -2,7 +2,8 @@
 //
 // Once a raw sample: FluxTorque, the air-gap torque. Once a tick (1 ms):
 //   frequency  psi_R = psi - L_sigma i;  w_psi = arg(psi_R conj psi_R,prev)/h, w_i likewise   (E100)
-//              w_e += (1 - exp(-h/15 ms)) (w_x - w_e), w_x = w_psi once it agrees, else w_i    (E101)
+//              w_e += s (w_x - w_e) + a_e h,  a_e += s^2/4 (w_x - w_e)/h,  s = 1 - exp(-h/15 ms)
+//              w_x = w_psi once it agrees, else w_i                                          (E101)
 //   speed      measured less its ripple, or without a sensor
 //              (w_psi - w_sl)/p, w_sl = 2 R_R T_m / (3 p |psi_R|^2)                            (E102)
 //   noise      NoiseMeter (E103);  ripple  SpeedRipple (E105)
@@ -96,6 +97,7 @@ class FusedObserver {
     SpaceVector rotor_flux_v_s{};
     SpaceVector current_a{};
     float frequency_rad_s = 0.0F;
+    float acceleration_rad_s2 = 0.0F;  // of the frequency
     float locked_s = 0.0F;
     float speed_sum_rad_s = 0.0F;
     std::uint32_t speed_count = 0;
