@@ -223,7 +223,9 @@ class BasicControlPath {
                         .mode = LawMode::kHold,
                         .may_rise = false,
                         .controlling = controlling};
-    const float fallen_pct = std::min(fall_pct_, sent_pct) - fall_pct_per_tick_;
+    // From where the fall has got to, which is between two steps; from what was sent at its begin.
+    const float fallen_pct =
+        std::min(fall_pct_, sent_pct + feed_override_.tolerance_pct()) - fall_pct_per_tick_;
     fall_pct_ = sent_pct;
 
     if (!controlling) {

@@ -7,8 +7,9 @@
 // on > off, both as parts of the force reference: noise does not toggle. A force that vanishes in
 // the cut is a broken tool until proved otherwise: for `lost_s` after it the cut is not believed to
 // be over, and nothing may speed up (FAULTS 1.2 row 17). A tick whose force has fallen steeply is
-// the first sign of it (`falling`), before the force is below `off`. A gap of an interrupted cut
-// looks the same and returns from exit to cut without a new entry.
+// the first sign of it (`falling`), before the force is below `off`; measured against the force
+// itself, so that a lagging estimate is seen to fall to the end of its decay. A gap of an
+// interrupted cut looks the same and returns from exit to cut without a new entry.
 #pragma once
 
 #include <algorithm>
@@ -24,16 +25,14 @@ class CutState {
  public:
   enum class ConfigError : std::uint8_t { kPeriod, kThresholds, kEntry, kLost, kDrop };
 
-  static constexpr float kNeverSteepRatio = 1e6F;
-
   struct Config {
     float period_s;
     float on_ratio;    // of the reference; 0.13
     float off_ratio;   // of the reference; 0.10
     float entry_s;     // a cut counts as entered after this; 0.15
     float lost_s;      // a cut counts as lost after this; 0.5
-    float drop_ratio;  // of the reference: a fall by more within one tick is steep; 0.1
-                       // (kNeverSteepRatio: a paper's law as printed)
+    float drop_ratio;  // of the force before: a fall by more within one tick is steep; 0.1
+                       // (1: never, for a paper's law as printed)
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       if (!(period_s > 0.0F && period_s <= 10.0F)) return std::unexpected{ConfigError::kPeriod};
@@ -43,8 +42,7 @@ class CutState {
         return std::unexpected{ConfigError::kEntry};
       if (!(lost_s >= period_s && lost_s <= kLongestTicks * period_s))
         return std::unexpected{ConfigError::kLost};
-      if (!(drop_ratio > 0.0F && drop_ratio <= kNeverSteepRatio))
-        return std::unexpected{ConfigError::kDrop};
+      if (!(drop_ratio > 0.0F && drop_ratio <= 1.0F)) return std::unexpected{ConfigError::kDrop};
       return {};
     }
   };
@@ -78,7 +76,7 @@ class CutState {
     const bool on = input.force_n > config_.on_ratio * input.force_reference_n;    // (C6)
     const bool off = input.force_n < config_.off_ratio * input.force_reference_n;  // (C6)
     const bool steep =
-        state_.force_n - input.force_n > config_.drop_ratio * input.force_reference_n;  // (C7)
+        state_.force_n - input.force_n > config_.drop_ratio * state_.force_n;  // (C7)
     state_.force_n = input.force_n;
     state_.ticks = std::min(state_.ticks + 1, lost_ticks_ + entry_ticks_ + 1);
     advance(on, off);

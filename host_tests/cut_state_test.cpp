@@ -68,10 +68,15 @@ TEST(CutState, TakesALightCutForACutInTheEnd) {
 
 TEST(CutState, NamesASteepFallInTheCutOnly) {
   auto cut = cutting(400.0F);
-  EXPECT_FALSE(cut.step(at(351.0F)).falling);
-  EXPECT_TRUE(cut.step(at(300.0F)).falling);
-  EXPECT_FALSE(cut.step(at(300.0F)).falling);
+  EXPECT_FALSE(cut.step(at(361.0F)).falling);
+  EXPECT_TRUE(cut.step(at(320.0F)).falling);
+  EXPECT_FALSE(cut.step(at(320.0F)).falling);
   EXPECT_TRUE(cut.step(at(0.0F)).falling);
+  auto config = kLathe;
+  config.drop_ratio = 1.0F;
+  auto literal = CutState::make(config).value();
+  for (int i = 0; i < 10; ++i) std::ignore = literal.step(at(400.0F));
+  EXPECT_FALSE(literal.step(at(0.0F)).falling);
   auto air = CutState::make(kLathe).value();
   std::ignore = air.step(at(64.0F));
   EXPECT_FALSE(air.step(at(0.0F)).falling);

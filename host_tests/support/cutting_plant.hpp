@@ -1,5 +1,5 @@
 // The simplest machine that a control law can be closed around: feed override in, cutting force
-// out, once a control tick, in double, with no random part. Equations EQUATIONS.md (C15), (C16).
+// out, once a control tick, in double, with no random part. Equation (C15): control/EQUATIONS.md.
 //
 //   q(i) = c a(i) (U(i - latency) / 100)^p       force at rest for the override, [N]
 //   F(i+1) = alpha F(i) + (1 - alpha) q(i),      alpha = exp(-T / tau)
