@@ -1,1 +1,0 @@
-#include "hal/port.hpp"
