@@ -99,8 +99,7 @@ class PiController {
   static constexpr float kFarPct = 1e4F;  // far beyond every limit, and finite
 
   explicit constexpr PiController(const Config& config) noexcept
-      : config_(config),
-        proportional_pct_n_(config.proportional_pct_n),
+      : proportional_pct_n_(config.proportional_pct_n),
         integral_pct_n_(config.integral_pct_n_s * config.period_s),
         // The velocity form is the position form that gives way at once.
         tracking_ratio_(config.form == Form::kVelocity ? 1.0F
@@ -113,7 +112,6 @@ class PiController {
            integral_pct_n_ * error_n;
   }
 
-  Config config_;
   float proportional_pct_n_;
   float integral_pct_n_;
   float tracking_ratio_;
