@@ -1,0 +1,107 @@
+// Which override acted on the force that is being looked at: the one that was sent, unless the CNC
+// reports another and so does not follow (locked, or its own knob turned). FAULTS 1.2 row 19.
+//
+//   The CNC follows iff its report lies within what was sent over the last `delay_ticks` + 1 ticks,
+//   give or take `tolerance_pct`, (C14). The report of a CNC that follows is late by its own
+//   delay, so what was sent is the better number then. After `confirm_ticks` reports in a row that
+//   do not follow, the report is the override that acts, and a law cannot wind up against it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <expected>
+#include <type_traits>
+
+namespace cutforce::control {
+
+class AppliedOverride {
+ public:
+  static constexpr std::size_t kHistory = 16;
+
+  enum class ConfigError : std::uint8_t { kDelay, kConfirm, kTolerance, kInitial };
+
+  struct Config {
+    std::uint32_t delay_ticks;    // longest delay of the CNC's report, below kHistory
+    std::uint32_t confirm_ticks;  // at least 1
+    float tolerance_pct;
+    std::uint8_t initial_pct;  // sent before the first step
+
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
+      if (delay_ticks >= kHistory) return std::unexpected{ConfigError::kDelay};
+      if (confirm_ticks < 1 || confirm_ticks > 1'000'000)
+        return std::unexpected{ConfigError::kConfirm};
+      if (!(tolerance_pct >= 0.0F && tolerance_pct <= 100.0F))
+        return std::unexpected{ConfigError::kTolerance};
+      if (initial_pct > 254) return std::unexpected{ConfigError::kInitial};
+      return {};
+    }
+  };
+
+  struct Input {
+    std::uint8_t sent_pct;  // with the last tick's command
+    float reported_pct;
+    bool reported;  // false: the CNC tells nothing
+  };
+
+  struct Output {
+    float applied_pct;
+    bool follows;
+  };
+
+  struct State {
+    std::array<std::uint8_t, kHistory> sent_pct{};  // newest first
+    std::uint32_t differing_ticks = 0;
+  };
+
+  // Fails iff check() does.
+  [[nodiscard]] static constexpr std::expected<AppliedOverride, ConfigError> make(
+      const Config& config) noexcept {
+    if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+    return AppliedOverride{config};
+  }
+
+  // A report that is not within 0..255 % tells nothing.
+  [[nodiscard]] constexpr Output step(const Input& input) noexcept {
+    for (std::size_t i = kHistory - 1; i > 0; --i) state_.sent_pct[i] = state_.sent_pct[i - 1];
+    state_.sent_pct[0] = input.sent_pct;
+
+    const bool told = input.reported && input.reported_pct >= 0.0F && input.reported_pct <= 255.0F;
+    if (!told || follows(input.reported_pct)) {
+      state_.differing_ticks = 0;
+    } else {
+      state_.differing_ticks = std::min(state_.differing_ticks + 1, config_.confirm_ticks);
+    }
+    const bool locked = state_.differing_ticks >= config_.confirm_ticks;
+    return {.applied_pct = locked ? input.reported_pct : static_cast<float>(input.sent_pct),
+            .follows = !locked};
+  }
+
+  [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
+  constexpr void restore(const State& state) noexcept { state_ = state; }
+
+ private:
+  explicit constexpr AppliedOverride(const Config& config) noexcept : config_(config) {
+    state_.sent_pct.fill(config.initial_pct);
+  }
+
+  [[nodiscard]] constexpr bool follows(float reported_pct) const noexcept {  // (C14)
+    std::uint8_t lowest = 255;
+    std::uint8_t highest = 0;
+    for (std::size_t i = 0; i <= config_.delay_ticks; ++i) {
+      lowest = std::min(lowest, state_.sent_pct[i]);
+      highest = std::max(highest, state_.sent_pct[i]);
+    }
+    return reported_pct >= static_cast<float>(lowest) - config_.tolerance_pct &&
+           reported_pct <= static_cast<float>(highest) + config_.tolerance_pct;
+  }
+
+  Config config_;
+  State state_{};
+};
+
+static_assert(std::is_trivially_copyable_v<AppliedOverride>);
+static_assert(sizeof(AppliedOverride::State) == 16 + 4);
+
+}  // namespace cutforce::control

@@ -1,0 +1,8 @@
+// The one instance that the firmware runs, compiled once with the core's own options.
+#include "control/control_path.hpp"
+
+namespace cutforce::control {
+
+template class BasicControlPath<PiController>;
+
+}  // namespace cutforce::control

@@ -1,0 +1,53 @@
+// The one shape of every controller: what a law is told once a control tick, and what it answers.
+//
+// A law decides nothing but the override it wants. Limits, slew, rounding, air cut and lost
+// estimates are dealt with around it (control_path.hpp), and it learns of them from one number,
+// the override that really acted. Bumpless switching follows from Mode: a law that is not in
+// charge still runs every tick and follows the override of whoever is, so that its first own
+// answer continues from there. This holds for enabling, for the end of an air cut, for a held
+// estimate, and for a change of law (let all run, put one in charge).
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <expected>
+#include <type_traits>
+
+#include "control/cut_state.hpp"
+
+namespace cutforce::control {
+
+enum class LawMode : std::uint8_t {
+  kActive,  // in charge: the answer is used
+  kTrack,   // another decides, the force is new: follow the override, remember the force
+  kHold,    // another decides, the force is not to be learned from: follow the override only
+};
+
+struct LawInput {
+  float force_reference_n;
+  float force_n;                 // finite and >= 0, always; the last good one in kHold
+  float force_sigma_n;           // finite and >= 0
+  float override_applied_pct;    // acted over the interval that produced force_n
+  float override_tolerance_pct;  // a wanted override this close to the applied one was only rounded
+  CutPhase phase;
+  LawMode mode;
+};
+
+struct LawOutput {
+  float override_pct;  // wanted, before limits, slew and rounding; the applied one unless kActive
+};
+
+template <class L>
+concept Law = std::is_trivially_copyable_v<L> && std::is_trivially_copyable_v<typename L::State> &&
+    requires(L& law, const L& fixed, const LawInput& input, const typename L::Config& config,
+             const typename L::State& state) {
+  { L::make(config) } -> std::same_as<std::expected<L, typename L::ConfigError>>;
+  { law.step(input) }
+  noexcept->std::same_as<LawOutput>;
+  { fixed.state() }
+  noexcept->std::same_as<const typename L::State&>;
+  { law.restore(state) }
+  noexcept;
+};
+
+}  // namespace cutforce::control

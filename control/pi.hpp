@@ -1,0 +1,124 @@
+// PI law with fixed gains, (C1)-(C4): P1 (4), P3 4.1.
+//
+//   E(i) = F_r - F(i)
+//   velocity form   U(i) = U_b(i-1) + (Kp + Ki T) E(i) - Kp E(i-1)
+//   position form   U(i) = Kp E(i) + I(i),
+//                   I(i) = I(i-1) + Ki T E(i) + (T / T_t) (U_b(i-1) - U(i-1))
+//   U_b(i-1) = U(i-1) moved to within the rounding of the override that really acted
+//
+// E [N], U and I [%], Kp [%/N], Ki [%/(N s)], T the period, T_t the tracking time. U_b is the whole
+// anti-windup: what a limit, a slew rate, an air cut or the CNC took away is not remembered, what
+// mere rounding took away is, else every increment below half a step would be lost and the loop
+// would rest at a wrong force. With T_t = T both forms are the same law.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <expected>
+#include <type_traits>
+
+#include "control/law.hpp"
+
+namespace cutforce::control {
+
+class PiController {
+ public:
+  enum class ConfigError : std::uint8_t { kPeriod, kForm, kGain, kTracking };
+  enum class Form : std::uint8_t { kVelocity, kPosition };
+
+  struct Config {
+    float period_s;
+    Form form;
+    float proportional_pct_n;
+    float integral_pct_n_s;
+    float tracking_s;  // position form: time in which the integral gives way, at least the period
+
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
+      if (!(period_s > 0.0F && period_s <= 10.0F)) return std::unexpected{ConfigError::kPeriod};
+      if (form != Form::kVelocity && form != Form::kPosition)
+        return std::unexpected{ConfigError::kForm};
+      if (!(proportional_pct_n >= 0.0F && proportional_pct_n <= kGainLimit))
+        return std::unexpected{ConfigError::kGain};
+      if (!(integral_pct_n_s > 0.0F && integral_pct_n_s <= kGainLimit))
+        return std::unexpected{ConfigError::kGain};
+      if (!(tracking_s >= period_s && tracking_s <= 1e4F * period_s))
+        return std::unexpected{ConfigError::kTracking};
+      return {};
+    }
+
+    // Largest process gain k [N/%] at which the loop is stable on the plant F(i) = k U(i-1), the
+    // cut that settles within one tick: k Kp < 1 and k (2 Kp + Ki T) < 2, (C13).
+    [[nodiscard]] constexpr float highest_process_gain_n_pct() const noexcept {
+      const float alternating = 2.0F / (2.0F * proportional_pct_n + integral_pct_n_s * period_s);
+      return proportional_pct_n > 0.0F ? std::min(alternating, 1.0F / proportional_pct_n)
+                                       : alternating;
+    }
+  };
+
+  using Input = LawInput;
+  using Output = LawOutput;
+
+  struct State {
+    float wanted_pct = 100.0F;  // U(i-1)
+    float error_n = 0.0F;       // E(i-1)
+  };
+
+  // Fails iff check() does.
+  [[nodiscard]] static constexpr std::expected<PiController, ConfigError> make(
+      const Config& config) noexcept {
+    if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+    return PiController{config};
+  }
+
+  [[nodiscard]] constexpr Output step(const Input& input) noexcept {
+    const float error_n = input.force_reference_n - input.force_n;  // (C1)
+    const float base_pct =
+        std::clamp(state_.wanted_pct, input.override_applied_pct - input.override_tolerance_pct,
+                   input.override_applied_pct + input.override_tolerance_pct);  // (C2)
+    switch (input.mode) {
+      case LawMode::kActive:
+        state_.wanted_pct = std::clamp(wanted_pct(base_pct, error_n), -kFarPct, kFarPct);
+        state_.error_n = error_n;
+        return {.override_pct = state_.wanted_pct};
+      case LawMode::kTrack:
+        state_.error_n = error_n;
+        break;
+      case LawMode::kHold:
+        break;
+    }
+    // Following: P1 (4) from here with E(i-1) = E(i) moves by the integral part alone.
+    state_.wanted_pct = base_pct;
+    return {.override_pct = input.override_applied_pct};
+  }
+
+  [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
+  constexpr void restore(const State& state) noexcept { state_ = state; }
+
+ private:
+  static constexpr float kGainLimit = 1e4F;
+  static constexpr float kFarPct = 1e4F;  // far beyond every limit, and finite
+
+  explicit constexpr PiController(const Config& config) noexcept
+      : proportional_pct_n_(config.proportional_pct_n),
+        integral_pct_n_(config.integral_pct_n_s * config.period_s),
+        // The velocity form is the position form that gives way at once.
+        tracking_ratio_(config.form == Form::kVelocity ? 1.0F
+                                                       : config.period_s / config.tracking_s) {}
+
+  // (C3), (C4) in one: I(i-1) = U(i-1) - Kp E(i-1) needs no state of its own.
+  [[nodiscard]] constexpr float wanted_pct(float base_pct, float error_n) const noexcept {
+    const float before_pct = state_.wanted_pct + tracking_ratio_ * (base_pct - state_.wanted_pct);
+    return before_pct + proportional_pct_n_ * (error_n - state_.error_n) +
+           integral_pct_n_ * error_n;
+  }
+
+  float proportional_pct_n_;
+  float integral_pct_n_;
+  float tracking_ratio_;
+  State state_{};
+};
+
+static_assert(Law<PiController>);
+static_assert(sizeof(PiController::State) == 2 * 4);
+
+}  // namespace cutforce::control
