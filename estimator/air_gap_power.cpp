@@ -59,8 +59,7 @@ auto AirGapPower::close_window() noexcept -> Output {
       .input_power_w = mean + loss_ohm_ * square,
       .current_square_a2 = square,
       // (E25): scatter from first differences, which a load step within the window hardly moves.
-      .noise_variance_w2 =
-          0.5F * state_.difference_square_w2 / (state_.weight * state_.weight)};
+      .noise_variance_w2 = 0.5F * state_.difference_square_w2 / (state_.weight * state_.weight)};
   state_.sample = 0;
   state_.weight = 0.0F;
   state_.airgap_w = 0.0F;

@@ -36,7 +36,7 @@ class AirGapPower {
     std::uint32_t samples_per_window;
     float stator_resistance_ohm;  // star-equivalent
     Mode mode;
-    float power_factor_ratio;     // cos(phi), read in kFixedPowerFactor only
+    float power_factor_ratio;  // cos(phi), read in kFixedPowerFactor only
     Window window;
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
@@ -62,17 +62,17 @@ class AirGapPower {
   };
 
   struct Output {
-    float airgap_power_w;       // mean over the window
+    float airgap_power_w;  // mean over the window
     float input_power_w;
-    float current_square_a2;    // mean of |i|^2, for the share of R_s in the uncertainty
-    float noise_variance_w2;    // of the mean airgap_power_w, from the samples' scatter, (E25)
+    float current_square_a2;  // mean of |i|^2, for the share of R_s in the uncertainty
+    float noise_variance_w2;  // of the mean airgap_power_w, from the samples' scatter, (E25)
   };
 
   struct State {
-    std::uint32_t sample = 0;        // of the window, 0: the next sample starts one
-    std::uint32_t started = 0;       // 0: there is no sample before the next one
-    float skip_samples = 0.0F;       // left out at the start of the window
-    float weight = 0.0F;             // sums over the window so far
+    std::uint32_t sample = 0;   // of the window, 0: the next sample starts one
+    std::uint32_t started = 0;  // 0: there is no sample before the next one
+    float skip_samples = 0.0F;  // left out at the start of the window
+    float weight = 0.0F;        // sums over the window so far
     float airgap_w = 0.0F;
     float current_square_a2 = 0.0F;
     float difference_square_w2 = 0.0F;

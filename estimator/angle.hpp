@@ -14,8 +14,8 @@ namespace cutforce::estimator {
 
 // atan(x) for x in [0, 1].
 [[nodiscard]] constexpr float arctangent(float x) noexcept {
-  constexpr std::array<float, 8> kCoefficients{9.999999e-01F,   -3.333199e-01F,  1.9969723e-01F,
-                                               -1.4019476e-01F, 9.9142775e-02F,  -5.9486147e-02F,
+  constexpr std::array<float, 8> kCoefficients{9.999999e-01F,   -3.333199e-01F, 1.9969723e-01F,
+                                               -1.4019476e-01F, 9.9142775e-02F, -5.9486147e-02F,
                                                2.4252215e-02F,  -4.69322e-03F};
   const float square = x * x;
   float sum = kCoefficients[7];

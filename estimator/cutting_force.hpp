@@ -18,9 +18,9 @@ class CuttingForce {
   enum class ConfigError : std::uint8_t { kGearRatio, kMinimumSpeed, kDiameterSigma };
 
   struct Config {
-    float gear_ratio;              // motor turns per spindle turn
-    float minimum_speed_rad_s;     // motor shaft; below it there is no estimate
-    float diameter_sigma_m;        // standard deviation of the stated diameter
+    float gear_ratio;           // motor turns per spindle turn
+    float minimum_speed_rad_s;  // motor shaft; below it there is no estimate
+    float diameter_sigma_m;     // standard deviation of the stated diameter
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       if (!(gear_ratio > 0.0F && gear_ratio < 1e4F)) {
@@ -37,16 +37,16 @@ class CuttingForce {
   };
 
   struct Input {
-    float cutting_torque_nm;        // at the motor, with the sign of its shaft
+    float cutting_torque_nm;  // at the motor, with the sign of its shaft
     float cutting_torque_sigma_nm;
-    float speed_rad_s;              // motor shaft
-    float diameter_m;               // of the workpiece or tool now; 0: not known
+    float speed_rad_s;  // motor shaft
+    float diameter_m;   // of the workpiece or tool now; 0: not known
   };
 
   enum class Status : std::uint8_t { kForce, kBelowMinimumSpeed, kNoDiameter };
 
   struct Output {
-    float force_n;        // 0 unless status is kForce
+    float force_n;  // 0 unless status is kForce
     float force_sigma_n;
     Status status;
   };
@@ -70,7 +70,7 @@ class CuttingForce {
     const float per_torque = 2.0F * config_.gear_ratio / input.diameter_m;
     const float braking_nm =
         input.speed_rad_s < 0.0F ? -input.cutting_torque_nm : input.cutting_torque_nm;
-    const float force = braking_nm * per_torque;                          // (E42)
+    const float force = braking_nm * per_torque;  // (E42)
     const float from_torque = input.cutting_torque_sigma_nm * per_torque;
     const float from_diameter = force * config_.diameter_sigma_m / input.diameter_m;
     return {.force_n = force,

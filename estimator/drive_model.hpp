@@ -31,9 +31,9 @@ class DriveModel {
   };
 
   struct Input {
-    float airgap_torque_nm;   // mean over the window that ends now
-    float speed_rad_s;        // motor shaft, at the end of the window
-    float viscous_nm_s_rad;   // B; may be re-identified from window to window, not negative
+    float airgap_torque_nm;  // mean over the window that ends now
+    float speed_rad_s;       // motor shaft, at the end of the window
+    float viscous_nm_s_rad;  // B; may be re-identified from window to window, not negative
   };
 
   struct Output {
@@ -43,8 +43,8 @@ class DriveModel {
   };
 
   struct State {
-    float speed_rad_s = 0.0F;    // at the end of the window before
-    std::uint32_t windows = 0;   // 0: none yet, the next one has no inertia part
+    float speed_rad_s = 0.0F;   // at the end of the window before
+    std::uint32_t windows = 0;  // 0: none yet, the next one has no inertia part
   };
 
   // Fails iff check() does.
@@ -60,9 +60,9 @@ class DriveModel {
     const float per_b = gain(input.viscous_nm_s_rad);
     const float inertia = config_.inertia_kg_m2 * change / config_.period_s;
     state_ = {.speed_rad_s = input.speed_rad_s, .windows = 1};
-    return {.external_torque_nm = input.airgap_torque_nm - per_b * change -
-                                  input.viscous_nm_s_rad * before,  // (E30)
-            .load_torque_nm = input.airgap_torque_nm - inertia,     // (E32)
+    return {.external_torque_nm =
+                input.airgap_torque_nm - per_b * change - input.viscous_nm_s_rad * before,  // (E30)
+            .load_torque_nm = input.airgap_torque_nm - inertia,                             // (E32)
             .inertia_torque_nm = inertia};
   }
 

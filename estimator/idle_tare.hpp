@@ -44,21 +44,21 @@ class IdleTare {
 
   struct Config {
     float period_s;
-    float coulomb_nm;               // T_fco and B of the machine file
+    float coulomb_nm;  // T_fco and B of the machine file
     float viscous_nm_s_rad;
-    float idle_sigma_nm;            // standard deviation of the idle torque they give
-    float viscous_sigma_nm_s_rad;   // of B alone: widens the band away from the tare's speed
-    float inertia_sigma_ratio;      // of J: widens the band while the speed changes
-    float band_least_nm;            // the band is 5 standard deviations of the idle torque
-    float band_most_nm;             //   between these limits
-    float wait_s;                   // rest before the torque counts as idle
-    float memory_s;                 // time constant of the tare
-    float drift_nm_s;               // the fastest the tare may move once it is taken
-    float aging_nm_sqrt_s;          // standard deviation of the idle torque after a second of age
-    float steady_rad_s;             // change of speed in one window that still counts as steady
-    float speed_spread_rad_s;       // of the idles, before B is told from T_fco
-    float forgetting_ratio;         // weight of the idle before in that regression
-    float minimum_speed_rad_s;      // standstill below
+    float idle_sigma_nm;           // standard deviation of the idle torque they give
+    float viscous_sigma_nm_s_rad;  // of B alone: widens the band away from the tare's speed
+    float inertia_sigma_ratio;     // of J: widens the band while the speed changes
+    float band_least_nm;           // the band is 5 standard deviations of the idle torque
+    float band_most_nm;            //   between these limits
+    float wait_s;                  // rest before the torque counts as idle
+    float memory_s;                // time constant of the tare
+    float drift_nm_s;              // the fastest the tare may move once it is taken
+    float aging_nm_sqrt_s;         // standard deviation of the idle torque after a second of age
+    float steady_rad_s;            // change of speed in one window that still counts as steady
+    float speed_spread_rad_s;      // of the idles, before B is told from T_fco
+    float forgetting_ratio;        // weight of the idle before in that regression
+    float minimum_speed_rad_s;     // standstill below
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
   };
@@ -68,7 +68,7 @@ class IdleTare {
     float inertia_torque_nm;  // that was taken off
     float speed_rad_s;        // magnitude, mean over the window
     Feed feed;
-    bool valid;               // false: no torque in this window; the state rests
+    bool valid;  // false: no torque in this window; the state rests
   };
 
   struct Output {
@@ -79,8 +79,8 @@ class IdleTare {
     float noise_sigma_nm;    // of one window's torque, as seen in idle; 0: never idle yet
     float age_s;             // since the tare was last moved
     bool in_cut;
-    bool taring;             // this window is idle and at rest
-    bool acquired;           // tared at least once; before it the machine file speaks
+    bool taring;    // this window is idle and at rest
+    bool acquired;  // tared at least once; before it the machine file speaks
   };
 
   enum class Mode : std::uint32_t { kSearching, kIdle, kCut };
@@ -88,22 +88,22 @@ class IdleTare {
   struct State {
     float coulomb_nm = 0.0F;
     float viscous_nm_s_rad = 0.0F;
-    float speed_rad_s = 0.0F;            // of the window before
-    float tare_speed_rad_s = 0.0F;       // where the tare was last moved
-    float rest_torque_nm = 0.0F;         // mean of the torque while it rests
+    float speed_rad_s = 0.0F;       // of the window before
+    float tare_speed_rad_s = 0.0F;  // where the tare was last moved
+    float rest_torque_nm = 0.0F;    // mean of the torque while it rests
     float noise_variance_nm2 = 0.0F;
-    float highest_nm = 0.0F;             // torque above idle, highest since contact
+    float highest_nm = 0.0F;  // torque above idle, highest since contact
     float age_s = 0.0F;
-    std::array<float, 4> recent_nm{};    // torque of the latest windows at rest, ring
-    std::uint32_t recent = 0;            // how many were ever put there since the last unrest
+    std::array<float, 4> recent_nm{};  // torque of the latest windows at rest, ring
+    std::uint32_t recent = 0;          // how many were ever put there since the last unrest
     std::uint32_t rest_windows = 0;
-    std::uint32_t steady_windows = 0;    // of steady speed
+    std::uint32_t steady_windows = 0;  // of steady speed
     std::uint32_t acquired = 0;
     Mode mode = Mode::kSearching;
-    std::uint32_t idle_windows = 0;      // of this idle; its mean torque and speed:
+    std::uint32_t idle_windows = 0;  // of this idle; its mean torque and speed:
     float idle_torque_nm = 0.0F;
     float idle_speed_rad_s = 0.0F;
-    float weight = 0.0F;                 // regression over idles, (E47), centred sums
+    float weight = 0.0F;  // regression over idles, (E47), centred sums
     float mean_speed_rad_s = 0.0F;
     float mean_torque_nm = 0.0F;
     float speed_speed = 0.0F;
@@ -178,7 +178,8 @@ constexpr std::expected<void, IdleTare::ConfigError> IdleTare::Config::check() c
 }
 
 constexpr IdleTare::IdleTare(const Config& config) noexcept
-    : config_(config), wait_windows_(static_cast<std::uint32_t>(config.wait_s / config.period_s + 0.5F)) {
+    : config_(config),
+      wait_windows_(static_cast<std::uint32_t>(config.wait_s / config.period_s + 0.5F)) {
   state_.coulomb_nm = config.coulomb_nm;
   state_.viscous_nm_s_rad = config.viscous_nm_s_rad;
   // Until idle was seen, the band is at its upper limit.

@@ -4,8 +4,9 @@
 // loss(w) is a table over speed, so that a polynomial c_0 + c_1 w, magnetising copper and iron
 // loss all fit. The idle bias is the mean of P_o - P_g over the idle just before contact, where
 // computed power exists: P3's method compares the two powers and can do so only if they agree
-// when nothing is cut. It is learned only while the meter has settled. The meter's lag is a first-order model constant; it is not inverted here
-// but published for others, and turned into uncertainty:
+// when nothing is cut. It is learned only while the meter has settled. The meter's lag is a
+// first-order model constant; it is not inverted here but published for others, and turned into
+// uncertainty:
 //   sigma^2 = noise^2 + (share P_o)^2 + (lag dP_o/dt)^2                           (E38)
 // The last term is exact for a first-order lag: that much is the reading behind the power. What
 // the noise alone adds to it on average is taken off.
@@ -25,17 +26,17 @@ class MeasuredPower {
   enum class ConfigError : std::uint8_t { kPeriod, kScale, kLoss, kLag, kNoise, kMemory };
 
   struct Config {
-    float period_s;                // of the windows
+    float period_s;  // of the windows
     float scale_ratio;
     float offset_w;
-    float efficiency_ratio;        // 1 where a loss map is given instead
-    SpeedTable loss_w;             // over motor speed
-    float loss_quadratic_1_w;      // c_2
-    float lag_s;                   // first order, 0: none
-    float noise_w;                 // standard deviation of one window's mean
-    float model_sigma_ratio;       // of the conversion, share of P_o
-    float bias_memory_s;           // time constant of the idle bias
-    float settled_w;               // the bias is learned while P_o is this near to its own slow mean
+    float efficiency_ratio;    // 1 where a loss map is given instead
+    SpeedTable loss_w;         // over motor speed
+    float loss_quadratic_1_w;  // c_2
+    float lag_s;               // first order, 0: none
+    float noise_w;             // standard deviation of one window's mean
+    float model_sigma_ratio;   // of the conversion, share of P_o
+    float bias_memory_s;       // time constant of the idle bias
+    float settled_w;           // the bias is learned while P_o is this near to its own slow mean
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       if (!(period_s >= 1e-4F && period_s <= 10.0F)) return std::unexpected{ConfigError::kPeriod};
@@ -62,8 +63,8 @@ class MeasuredPower {
   };
 
   struct Input {
-    float meter_w;          // mean reading over the window
-    float speed_rad_s;      // motor shaft
+    float meter_w;      // mean reading over the window
+    float speed_rad_s;  // motor shaft
   };
 
   struct Output {
@@ -73,10 +74,10 @@ class MeasuredPower {
 
   struct State {
     float bias_w = 0.0F;
-    float unbiased_w = 0.0F;     // P_o before the bias, of the window before
-    float slow_w = 0.0F;         // its mean over about one lag
-    std::uint32_t windows = 0;   // seen, 0 or 1
-    std::uint32_t idle = 0;      // windows in the bias, at most the memory
+    float unbiased_w = 0.0F;    // P_o before the bias, of the window before
+    float slow_w = 0.0F;        // its mean over about one lag
+    std::uint32_t windows = 0;  // seen, 0 or 1
+    std::uint32_t idle = 0;     // windows in the bias, at most the memory
   };
 
   // Fails iff check() does.
@@ -94,8 +95,7 @@ class MeasuredPower {
                         config_.loss_quadratic_1_w * corrected * corrected;  // (E37)
     const float before = state_.windows == 0 ? power : state_.unbiased_w;
     const float slow = state_.windows == 0 ? power : state_.slow_w;
-    state_.slow_w =
-        slow + config_.period_s / (config_.period_s + config_.lag_s) * (power - slow);
+    state_.slow_w = slow + config_.period_s / (config_.period_s + config_.lag_s) * (power - slow);
     state_.unbiased_w = power;
     state_.windows = 1;
     return {.power_w = power - state_.bias_w, .sigma_w = sigma(power, power - before)};

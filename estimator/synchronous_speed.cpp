@@ -48,8 +48,8 @@ auto SynchronousSpeed::close_window() noexcept -> Output {
   const Output output{
       .electrical_rad_s = electrical,
       .synchronous_rad_s = electrical / config_.pole_pairs,  // (E27)
-      .synchronous_end_rad_s = state_.angle_end_rad /
-                               (end_count * config_.sample_period_s * config_.pole_pairs),
+      .synchronous_end_rad_s =
+          state_.angle_end_rad / (end_count * config_.sample_period_s * config_.pole_pairs),
       .flux_square_v2s2 = state_.flux_square_v2s2 / count * (1.0F + leak * leak),
       .valid = valid};
   state_.angle_rad = 0.0F;

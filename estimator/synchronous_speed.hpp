@@ -25,8 +25,7 @@ namespace cutforce::estimator {
 // backwards has negative speeds and a positive power.
 [[nodiscard]] inline float synchronous_speed_from_slip(float rotor_speed_rad_s,
                                                        float airgap_power_w,
-                                                       float rotor_resistance_ohm,
-                                                       float pole_pairs,
+                                                       float rotor_resistance_ohm, float pole_pairs,
                                                        float flux_square_v2s2) noexcept {
   const float magnitude = rotor_speed_rad_s < 0.0F ? -rotor_speed_rad_s : rotor_speed_rad_s;
   const float k = rotor_resistance_ohm / (1.5F * pole_pairs * pole_pairs * flux_square_v2s2);
@@ -53,10 +52,10 @@ class SynchronousSpeed {
     Vector vector;
     float pole_pairs;
     float stator_resistance_ohm;
-    float leakage_inductance_h;     // 0: the stator flux is taken for the rotor flux
-    float flux_leak_rad_s;          // lambda
-    float minimum_current_a;        // root mean square of |i| below which nothing is valid
-    float minimum_electrical_rad_s; // below it nothing is valid
+    float leakage_inductance_h;      // 0: the stator flux is taken for the rotor flux
+    float flux_leak_rad_s;           // lambda
+    float minimum_current_a;         // root mean square of |i| below which nothing is valid
+    float minimum_electrical_rad_s;  // below it nothing is valid
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       if (!(sample_period_s > 0.0F && sample_period_s <= 1.0F)) {
@@ -83,23 +82,23 @@ class SynchronousSpeed {
   };
 
   struct Output {
-    float electrical_rad_s;        // stator frequency, mean over the window
-    float synchronous_rad_s;       // the same at the shaft, w_s
-    float synchronous_end_rad_s;   // mean over the last fifth of the window: its end, for inertia
-    float flux_square_v2s2;        // |psi_R|^2, mean over the window
+    float electrical_rad_s;       // stator frequency, mean over the window
+    float synchronous_rad_s;      // the same at the shaft, w_s
+    float synchronous_end_rad_s;  // mean over the last fifth of the window: its end, for inertia
+    float flux_square_v2s2;       // |psi_R|^2, mean over the window
     bool valid;
   };
 
   struct State {
-    SpaceVector flux_vs{0.0F, 0.0F};   // stator flux
-    SpaceVector emf_v{0.0F, 0.0F};     // of the sample before
-    SpaceVector vector{0.0F, 0.0F};    // whose rotation is counted, of the sample before
-    float angle_rad = 0.0F;            // sums over the window so far
+    SpaceVector flux_vs{0.0F, 0.0F};  // stator flux
+    SpaceVector emf_v{0.0F, 0.0F};    // of the sample before
+    SpaceVector vector{0.0F, 0.0F};   // whose rotation is counted, of the sample before
+    float angle_rad = 0.0F;           // sums over the window so far
     float angle_end_rad = 0.0F;
     float flux_square_v2s2 = 0.0F;
     float current_square_a2 = 0.0F;
     std::uint32_t sample = 0;
-    std::uint32_t started = 0;         // 0: there is no sample before the next one
+    std::uint32_t started = 0;  // 0: there is no sample before the next one
   };
 
   // Fails iff check() does.

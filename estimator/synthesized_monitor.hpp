@@ -24,7 +24,7 @@ class SynthesizedMonitor {
     float period_s;
     Mode mode;
     float threshold_ratio;
-    float hold_s;              // rounded to whole periods
+    float hold_s;  // rounded to whole periods
     float compensation_ratio;
     float power_floor_w;
 
@@ -45,8 +45,8 @@ class SynthesizedMonitor {
   };
 
   struct Input {
-    float computed_power_w;    // P_g
-    float measured_power_w;    // P_o
+    float computed_power_w;  // P_g
+    float measured_power_w;  // P_o
     float computed_torque_nm;
     float measured_torque_nm;
   };
@@ -74,9 +74,8 @@ class SynthesizedMonitor {
         input.measured_power_w < 0.0F ? -input.measured_power_w : input.measured_power_w;
     const float below = amount > config_.power_floor_w ? amount : config_.power_floor_w;
     const float ratio = (input.computed_power_w - input.measured_power_w) / below;  // (E40)
-    const bool excess =
-        ratio > config_.threshold_ratio ||
-        (config_.mode == Mode::kAbsolute && ratio < -config_.threshold_ratio);
+    const bool excess = ratio > config_.threshold_ratio ||
+                        (config_.mode == Mode::kAbsolute && ratio < -config_.threshold_ratio);
 
     const bool computed = excess || state_.hold_windows > 0;
     if (excess) {

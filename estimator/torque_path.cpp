@@ -158,8 +158,8 @@ void TorquePath::find_speeds(const SynchronousSpeed::Output& synchronous,
 void TorquePath::estimate_torque(const Window& window, Feed feed, Output& output) noexcept {
   Estimate from_computed = computed(window);
   Estimate from_measured = measured(window);
-  const float leading_nm = window.has_airgap_power ? from_computed.airgap_torque_nm
-                                                   : from_measured.airgap_torque_nm;
+  const float leading_nm =
+      window.has_airgap_power ? from_computed.airgap_torque_nm : from_measured.airgap_torque_nm;
   const Load load = follow_load(window, leading_nm, feed);
   for (Estimate* estimate : {&from_computed, &from_measured}) {
     const auto cutting =
@@ -206,8 +206,8 @@ auto TorquePath::follow_load(const Window& window, float airgap_torque_nm, Feed 
   const float changed_nm = (tare.viscous_nm_s_rad - viscous) * window.speed_rad_s;
   return {.tare = tare,
           .inertia_torque_nm = driven.inertia_torque_nm,
-          .not_cutting_nm = airgap_torque_nm - driven.external_torque_nm + tare.coulomb_nm +
-                            changed_nm};
+          .not_cutting_nm =
+              airgap_torque_nm - driven.external_torque_nm + tare.coulomb_nm + changed_nm};
 }
 
 void TorquePath::publish(const Window& window, const Load& load, const Estimate& chosen,
@@ -216,13 +216,12 @@ void TorquePath::publish(const Window& window, const Load& load, const Estimate&
   output.airgap_torque_nm = window.direction * chosen.airgap_torque_nm;
   output.load_torque_nm = window.direction * (chosen.airgap_torque_nm - load.inertia_torque_nm);
   output.cutting_torque_nm = window.direction * chosen.cutting_torque_nm;
-  const float motion = sums_.has_torque != 0
-                           ? 0.5F * (chosen.cutting_torque_nm - sums_.cutting_torque_nm)
-                           : 0.0F;
+  const float motion =
+      sums_.has_torque != 0 ? 0.5F * (chosen.cutting_torque_nm - sums_.cutting_torque_nm) : 0.0F;
   sums_.cutting_torque_nm = chosen.cutting_torque_nm;
   sums_.has_torque = 1;
-  const float variance = chosen.sensitivity_ratio * chosen.sensitivity_ratio *
-                         torque_variance(window, load, chosen);
+  const float variance =
+      chosen.sensitivity_ratio * chosen.sensitivity_ratio * torque_variance(window, load, chosen);
   output.cutting_torque_sigma_nm = std::sqrt(variance + motion * motion);  // (E48)
 }
 

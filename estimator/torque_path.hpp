@@ -51,7 +51,7 @@ class TorquePath {
 
   struct Config {
     Method method;
-    Speed speed;                 // that the power is divided by
+    Speed speed;  // that the power is divided by
     AirGapPower::Config power;
     SynchronousSpeed::Config synchronous;
     MeasuredPower::Config meter;
@@ -61,11 +61,11 @@ class TorquePath {
     SynthesizedMonitor::Config monitor;
     float rotor_resistance_ohm;  // star-equivalent, stator side; 0: slip is not known
     float rated_torque_nm;
-    float rated_slip_ratio;      // what P3 (4) leaves out at rated torque: uncertainty
+    float rated_slip_ratio;  // what P3 (4) leaves out at rated torque: uncertainty
     float stator_resistance_sigma_ratio;
     float inertia_sigma_ratio;
-    float speed_sigma_rad_s;     // standard deviation of one speed sample
-    float minimum_speed_rad_s;   // no torque below
+    float speed_sigma_rad_s;    // standard deviation of one speed sample
+    float minimum_speed_rad_s;  // no torque below
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
   };
@@ -83,21 +83,21 @@ class TorquePath {
 
   // One window. What is not valid is 0.
   struct Output {
-    float airgap_power_w;           // P_g
-    float measured_power_w;         // P_o
-    float airgap_torque_nm;         // before inertia and friction
-    float load_torque_nm;           // after inertia
-    float cutting_torque_nm;        // after friction
+    float airgap_power_w;     // P_g
+    float measured_power_w;   // P_o
+    float airgap_torque_nm;   // before inertia and friction
+    float load_torque_nm;     // after inertia
+    float cutting_torque_nm;  // after friction
     float cutting_torque_sigma_nm;
-    float speed_rad_s;              // rotor, mean over the window
-    float synchronous_rad_s;        // from the signals
-    float idle_torque_nm;           // the tare at this speed, its sigma and its age
+    float speed_rad_s;        // rotor, mean over the window
+    float synchronous_rad_s;  // from the signals
+    float idle_torque_nm;     // the tare at this speed, its sigma and its age
     float idle_torque_sigma_nm;
     float tare_age_s;
     bool airgap_power_valid;
     bool measured_power_valid;
     bool speed_valid;
-    bool torque_valid;              // all three torques and sigma
+    bool torque_valid;  // all three torques and sigma
     bool in_cut;
     bool tared;
     Origin origin;
@@ -105,10 +105,10 @@ class TorquePath {
 
   // What the composition itself keeps between samples.
   struct Sums {
-    float speed_rad_s = 0.0F;             // over the window so far
+    float speed_rad_s = 0.0F;  // over the window so far
     float meter_w = 0.0F;
     float last_speed_rad_s = 0.0F;
-    std::uint32_t motor_samples = 0;      // valid ones in the window so far
+    std::uint32_t motor_samples = 0;  // valid ones in the window so far
     std::uint32_t speed_samples = 0;
     std::uint32_t meter_samples = 0;
     std::uint32_t continued = 0;          // 0: there is no sample before the next one
@@ -168,8 +168,7 @@ class TorquePath {
   [[nodiscard]] Estimate measured(const Window& window) const noexcept;
   [[nodiscard]] Estimate choose(const Window& window, const Estimate& computed,
                                 const Estimate& measured, Origin& origin) noexcept;
-  [[nodiscard]] Load follow_load(const Window& window, float airgap_torque_nm,
-                                 Feed feed) noexcept;
+  [[nodiscard]] Load follow_load(const Window& window, float airgap_torque_nm, Feed feed) noexcept;
   void publish(const Window& window, const Load& load, const Estimate& chosen,
                Output& output) noexcept;
   [[nodiscard]] float torque_variance(const Window& window, const Load& load,
