@@ -1,0 +1,133 @@
+#include "estimator/flux_torque.hpp"
+
+#include "estimator/polynomials.hpp"
+
+namespace cutforce::estimator {
+namespace {
+
+// Beyond this angle of rotation between two samples the sinusoid is not resolved; the integral
+// starts anew from the steady state.
+constexpr float kLargestHalfAngle_rad = 1.0F;
+constexpr float kSmallestFrequency_rad_s = 6.0F;   // below it the phase of the leak is not corrected
+constexpr float kSlowestLeak_rad_s = 10.0F;         // the leak never acts slower than at this w_e
+
+constexpr SpaceVector times(SpaceVector a, SpaceVector b) noexcept {
+  return {a.alpha * b.alpha - a.beta * b.beta, a.alpha * b.beta + a.beta * b.alpha};
+}
+
+}  // namespace
+
+auto FluxTorque::make(const Config& config) noexcept -> std::expected<FluxTorque, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  FluxTorque block{config};
+  block.set_frequency(0.0F);
+  return block;
+}
+
+auto FluxTorque::coefficients(float frequency_rad_s, float period_s) const noexcept
+    -> Coefficients {
+  const float magnitude = frequency_rad_s < 0.0F ? -frequency_rad_s : frequency_rad_s;
+  const float acting = magnitude > kSlowestLeak_rad_s ? magnitude : kSlowestLeak_rad_s;
+  const float leaked = config_.leak_ratio * acting * period_s;
+  const float a = leaked < 0.5F ? 1.0F - leaked : 0.5F;
+  const float half_angle = 0.5F * frequency_rad_s * period_s;
+  const float t_over_w = 0.5F * period_s * tan_over_x(half_angle);  // t / w_e
+  const float leak_over_w = magnitude > kSmallestFrequency_rad_s ? (1.0F - a) / frequency_rad_s : 0.0F;
+  return {.leak = a, .gain_s = {0.5F * t_over_w * (1.0F + a), -0.5F * leak_over_w}};  // (E64)
+}
+
+void FluxTorque::set_frequency(float frequency_rad_s) noexcept {
+  const auto [leak, gain] = coefficients(frequency_rad_s, config_.sample_period_s);
+  state_.leak = leak;
+  state_.gain_s = gain;
+  state_.frequency_rad_s = frequency_rad_s;
+}
+
+void FluxTorque::step(const MotorSample& sample, float elapsed_periods) noexcept {
+  const SpaceVector v = sample.voltage_v;
+  const SpaceVector i = sample.current_a;
+  const SpaceVector e{v.alpha - config_.stator_resistance_ohm * i.alpha,
+                      v.beta - config_.stator_resistance_ohm * i.beta};  // (E60)
+  float a = state_.leak;
+  SpaceVector c = state_.gain_s;
+  bool resolved = true;
+  if (elapsed_periods != 1.0F) {
+    const float period_s = elapsed_periods * config_.sample_period_s;
+    const float half_angle = 0.5F * state_.frequency_rad_s * period_s;
+    resolved = half_angle < kLargestHalfAngle_rad && half_angle > -kLargestHalfAngle_rad;
+    if (resolved) {
+      const auto fresh = coefficients(state_.frequency_rad_s, period_s);
+      a = fresh.leak;
+      c = fresh.gain_s;
+    }
+  }
+  if (state_.samples == 0) {
+    state_.emf_v = e;
+    state_.samples = 1;
+  }
+  if (resolved) {
+    const SpaceVector sum{e.alpha + state_.emf_v.alpha, e.beta + state_.emf_v.beta};
+    const SpaceVector grown = times(c, sum);
+    state_.flux_v_s = {a * state_.flux_v_s.alpha + grown.alpha,
+                       a * state_.flux_v_s.beta + grown.beta};  // (E61)
+  } else {
+    state_.emf_v = e;
+    seed();
+  }
+  const float torque = 1.5F * config_.pole_pairs * cross(i, state_.flux_v_s);  // (E62)
+
+  const float trapezoid = (torque + state_.torque_nm) * elapsed_periods;
+  state_.torque_sum_nm += trapezoid;
+  state_.moment_sum_nm += trapezoid * state_.elapsed_periods;
+  state_.power_sum_w += dot(v, i) * elapsed_periods;
+  state_.current_sum_a2 += dot(i, i) * elapsed_periods;
+  state_.elapsed_periods += elapsed_periods;
+  state_.torque_nm = torque;
+  state_.emf_v = e;
+  state_.current_a = i;
+}
+
+void FluxTorque::seed() noexcept {
+  const float w = state_.frequency_rad_s;
+  const float magnitude = w < 0.0F ? -w : w;
+  if (!(magnitude > kSmallestFrequency_rad_s)) return;
+  state_.flux_v_s = {state_.emf_v.beta / w, -state_.emf_v.alpha / w};  // e / (j w_e)
+}
+
+auto FluxTorque::take() noexcept -> Window {
+  Window window{.torque_nm = state_.torque_nm,
+                .moment_nm = 0.0F,
+                .power_w = 0.0F,
+                .current_squared_a2 = dot(state_.current_a, state_.current_a),
+                .duration_s = state_.elapsed_periods * config_.sample_period_s,
+                .flux_v_s = state_.flux_v_s,
+                .current_a = state_.current_a};
+  if (state_.elapsed_periods > 0.0F) {
+    const float per_period = 1.0F / state_.elapsed_periods;
+    window.torque_nm = 0.5F * state_.torque_sum_nm * per_period;
+    window.moment_nm = 0.5F * state_.moment_sum_nm * per_period * per_period;
+    window.power_w = 1.5F * state_.power_sum_w * per_period;
+    window.current_squared_a2 = state_.current_sum_a2 * per_period;
+  }
+  state_.torque_sum_nm = 0.0F;
+  state_.moment_sum_nm = 0.0F;
+  state_.power_sum_w = 0.0F;
+  state_.current_sum_a2 = 0.0F;
+  state_.elapsed_periods = 0.0F;
+  return window;
+}
+
+void FluxTorque::remove_offset(SpaceVector voltage_v, SpaceVector current_a) noexcept {
+  const SpaceVector e{voltage_v.alpha - config_.stator_resistance_ohm * current_a.alpha,
+                      voltage_v.beta - config_.stator_resistance_ohm * current_a.beta};
+  state_.emf_v = {state_.emf_v.alpha - e.alpha, state_.emf_v.beta - e.beta};
+  state_.current_a = {state_.current_a.alpha - current_a.alpha,
+                      state_.current_a.beta - current_a.beta};
+  const float forgotten = 1.0F - state_.leak;
+  if (!(forgotten > 0.0F)) return;
+  const SpaceVector left = times(state_.gain_s, e);
+  state_.flux_v_s = {state_.flux_v_s.alpha - 2.0F * left.alpha / forgotten,
+                     state_.flux_v_s.beta - 2.0F * left.beta / forgotten};
+}
+
+}  // namespace cutforce::estimator

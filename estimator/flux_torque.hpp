@@ -1,0 +1,109 @@
+// Air-gap torque of every raw sample from the stator flux.
+//
+//   e   = v - R_s i                                    back-emf                          (E60)
+//   psi = a psi + c (e + e_prev)                       leaky trapezoidal integral        (E61)
+//   T   = 1.5 p Im(conj(psi) i)                        air-gap torque                    (E62)
+//   a   = 1 - lambda |w_e| T_s                         leak, real                        (E63)
+//   c   = [t (1 + a) - j (1 - a)] / (2 w_e),  t = tan(w_e T_s / 2)                        (E64)
+//
+//   M   = (1/n^2) sum_l (l - 1) (T_(l-1) + T_l)/2      first moment over n samples          (E65)
+//
+// M is what the torque after each sample of the window has done to the mean of the speeds at the
+// samples: mean_j w_j = w_n - (h/J) (M - (n-1)/(2n) tau).
+// With (E64) the integral is exact for a sinusoid at w_e whatever the sample rate, and its gain
+// for an offset stays bounded: 2 c / (1 - a). All vectors are amplitude-invariant, R_s and flux
+// star-equivalent. Flux torque needs no division by a speed and is exact in transients, where
+// P_g / w_s moves with the magnetic energy.
+// Source: ESTIMATOR prototype 1.1, 1.2; derivation of (E64) in EQUATIONS.md.
+#pragma once
+
+#include <cstdint>
+#include <expected>
+#include <type_traits>
+
+#include "estimator/space_vector.hpp"
+
+namespace cutforce::estimator {
+
+class FluxTorque {
+ public:
+  enum class ConfigError : std::uint8_t { kPeriod, kPolePairs, kResistance, kLeak };
+
+  struct Config {
+    float sample_period_s;
+    float pole_pairs;
+    float stator_resistance_ohm;  // star-equivalent
+    float leak_ratio;             // lambda, 0.1 to 0.3 of the electrical frequency
+
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
+      if (!(sample_period_s > 0.0F)) return std::unexpected{ConfigError::kPeriod};
+      if (!(pole_pairs >= 1.0F)) return std::unexpected{ConfigError::kPolePairs};
+      if (!(stator_resistance_ohm >= 0.0F)) return std::unexpected{ConfigError::kResistance};
+      if (!(leak_ratio > 0.0F && leak_ratio < 1.0F)) return std::unexpected{ConfigError::kLeak};
+      return {};
+    }
+  };
+
+  // Means over the window since the last take(), trapezoidal in the torque.
+  struct Window {
+    float torque_nm;
+    float moment_nm;           // first moment of the torque, (E65)
+    float power_w;             // electrical input power 1.5 Re(v conj i)
+    float current_squared_a2;  // |i|^2
+    float duration_s;
+    SpaceVector flux_v_s;      // at the end of the window
+    SpaceVector current_a;     // at the end of the window
+  };
+
+  struct State {
+    SpaceVector flux_v_s{};
+    SpaceVector emf_v{};
+    SpaceVector current_a{};
+    float torque_nm = 0.0F;
+    float leak = 1.0F;               // a
+    SpaceVector gain_s{};            // c
+    float frequency_rad_s = 0.0F;    // w_e that a and c belong to
+    float torque_sum_nm = 0.0F;      // of T_prev + T, weighted by elapsed periods
+    float moment_sum_nm = 0.0F;      // the same, weighted by the periods before it
+    float power_sum_w = 0.0F;
+    float current_sum_a2 = 0.0F;
+    float elapsed_periods = 0.0F;
+    std::uint32_t samples = 0;       // since the start, saturating: the first has no predecessor
+  };
+
+  [[nodiscard]] static std::expected<FluxTorque, ConfigError> make(const Config& config) noexcept;
+
+  // elapsed_periods: time since the last sample in nominal sample periods; exactly 1 normally.
+  void step(const MotorSample& sample, float elapsed_periods) noexcept;
+
+  // Closes the window. Duration 0 (no sample since the last call) gives the last torque.
+  [[nodiscard]] Window take() noexcept;
+
+  // Electrical frequency for the samples to come, (E63), (E64).
+  void set_frequency(float frequency_rad_s) noexcept;
+
+  // Sets the flux to the steady state of the last sample at w_e.
+  void seed() noexcept;
+
+  // The voltages and currents to come are less by these offsets: takes what the old offsets left
+  // in the integral out of it.
+  void remove_offset(SpaceVector voltage_v, SpaceVector current_a) noexcept;
+
+  [[nodiscard]] const State& state() const noexcept { return state_; }
+  void restore(const State& state) noexcept { state_ = state; }
+
+ private:
+  explicit FluxTorque(const Config& config) noexcept : config_(config) {}
+  struct Coefficients {
+    float leak;
+    SpaceVector gain_s;
+  };
+  [[nodiscard]] Coefficients coefficients(float frequency_rad_s, float period_s) const noexcept;
+
+  Config config_;
+  State state_{};
+};
+
+static_assert(std::is_trivially_copyable_v<FluxTorque>);
+
+}  // namespace cutforce::estimator

@@ -1,0 +1,97 @@
+// Elementary functions by arithmetic alone, so that every target gives the same bits: glibc,
+// newlib and picolibc differ in the last place, and a Cortex-M4F pays for a library call.
+// Coefficients of atan, exp, log: S. L. Moshier, Cephes single precision library (public domain).
+// Error bounds are measured over all floats of the stated range by polynomials_test.cpp.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+
+namespace cutforce::estimator {
+
+// |error| <= 1.2e-7 rad for |x| <= tan(pi/8); (E50).
+[[nodiscard]] constexpr float atan_small(float x) noexcept {
+  const float z = x * x;
+  return (((8.05374449538e-2F * z - 1.38776856032e-1F) * z + 1.99777106478e-1F) * z -
+          3.33329491539e-1F) *
+             z * x +
+         x;
+}
+
+// Angle of (x, y) in (-pi, pi]; 0 for the null vector. |error| <= 4e-7 rad.
+[[nodiscard]] constexpr float angle_of(float x, float y) noexcept {
+  constexpr float kPi = 3.14159265358979F;
+  const float ax = x < 0.0F ? -x : x;
+  const float ay = y < 0.0F ? -y : y;
+  const float high = ax > ay ? ax : ay;
+  const float low = ax > ay ? ay : ax;
+  if (!(high > 0.0F)) return 0.0F;
+  const bool folded = low > 0.414213562F * high;
+  const float ratio = folded ? (low - high) / (low + high) : low / high;
+  float angle = atan_small(ratio) + (folded ? 0.25F * kPi : 0.0F);
+  if (ay > ax) angle = 0.5F * kPi - angle;
+  if (x < 0.0F) angle = kPi - angle;
+  return y < 0.0F ? -angle : angle;
+}
+
+// tan(x)/x by the [4/4] Pade approximant; relative error <= 3e-7 for |x| <= 1; (E51).
+[[nodiscard]] constexpr float tan_over_x(float x) noexcept {
+  const float z = x * x;
+  return (945.0F + z * (z - 105.0F)) / (945.0F + z * (15.0F * z - 420.0F));
+}
+
+// sin and cos by Taylor polynomials; |error| <= 2e-7 for |x| <= 0.8; (E52).
+[[nodiscard]] constexpr float sin_small(float x) noexcept {
+  const float z = x * x;
+  return x + x * z * (-1.6666667e-1F + z * (8.3333310e-3F + z * (-1.9840874e-4F + z * 2.7e-6F)));
+}
+[[nodiscard]] constexpr float cos_small(float x) noexcept {
+  const float z = x * x;
+  return 1.0F + z * (-0.5F + z * (4.16666642e-2F + z * (-1.38888e-3F + z * 2.46e-5F)));
+}
+
+// exp(x); relative error <= 2e-7 for |x| <= 87, clamped outside; (E53).
+[[nodiscard]] constexpr float exp_bounded(float x) noexcept {
+  if (x > 87.0F) x = 87.0F;
+  if (!(x > -87.0F)) x = -87.0F;
+  const float scaled = x * 1.44269504F;
+  const int power = static_cast<int>(scaled + (scaled < 0.0F ? -0.5F : 0.5F));
+  const float n = static_cast<float>(power);
+  const float r = (x - n * 0.693359375F) + n * 2.12194440e-4F;
+  const float poly =
+      ((((1.9875691500e-4F * r + 1.3981999507e-3F) * r + 8.3334519073e-3F) * r +
+        4.1665795894e-2F) *
+           r +
+       1.6666665459e-1F) *
+          r +
+      5.0000001201e-1F;
+  const float mantissa = poly * r * r + r + 1.0F;
+  const auto exponent = static_cast<std::uint32_t>(power + 127) << 23U;
+  return mantissa * std::bit_cast<float>(exponent);
+}
+
+// ln(x) for normal positive x; relative error <= 3e-7; (E54).
+[[nodiscard]] constexpr float log_positive(float x) noexcept {
+  const auto bits = std::bit_cast<std::uint32_t>(x);
+  int exponent = static_cast<int>(bits >> 23U) - 126;
+  float m = std::bit_cast<float>((bits & 0x007FFFFFU) | 0x3F000000U);  // in [0.5, 1)
+  if (m < 0.707106781F) {
+    --exponent;
+    m = m + m;
+  }
+  const float r = m - 1.0F;
+  const float z = r * r;
+  float poly = 7.0376836292e-2F;
+  poly = poly * r - 1.1514610310e-1F;
+  poly = poly * r + 1.1676998740e-1F;
+  poly = poly * r - 1.2420140846e-1F;
+  poly = poly * r + 1.4249322787e-1F;
+  poly = poly * r - 1.6668057665e-1F;
+  poly = poly * r + 2.0000714765e-1F;
+  poly = poly * r - 2.4999993993e-1F;
+  poly = poly * r + 3.3333331174e-1F;
+  const float n = static_cast<float>(exponent);
+  return r + (poly * r * z - 2.12194440e-4F * n - 0.5F * z) + 0.693359375F * n;
+}
+
+}  // namespace cutforce::estimator
