@@ -1,8 +1,16 @@
 #include "estimator/synchronous_speed.hpp"
 
-#include "estimator/angle.hpp"
+#include "estimator/polynomials.hpp"
 
 namespace cutforce::estimator {
+namespace {
+
+// Angle by which `to` is ahead of `from`, rad, in (-pi, pi].
+float angle_between(SpaceVector from, SpaceVector to) noexcept {
+  return angle_of(dot(to, from), cross(to, from));
+}
+
+}  // namespace
 
 auto SynchronousSpeed::step(const MotorSample& sample) noexcept -> std::optional<Output> {
   integrate_flux(sample);
