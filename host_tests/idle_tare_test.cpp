@@ -163,6 +163,28 @@ TEST(IdleTare, TellsViscousFromCoulombOnceItHasIdledAtTwoSpeeds) {
   EXPECT_NEAR(bench.error_nm(), 0.0F, 0.02F);
 }
 
+// Friction at a speed never idled at, and an inertia that is 5 % off while the speed gets there:
+// neither is a cut.
+TEST(IdleTare, DoesNotTakeAChangeOfSpeedForACut) {
+  Bench bench;
+  bench.viscous_nm_s_rad = 0.004F;  // file: 0.002
+  bench.speed_rad_s = 60.0F;
+  bench.idle(2.0F);
+  for (int k = 0; k < 10; ++k) {
+    bench.speed_rad_s += 9.7F;
+    const float inertia_nm = 0.03F * 9.7F / 0.05F;
+    bench.output = bench.tare.step({.load_torque_nm = bench.idle_nm() + 0.05F * inertia_nm,
+                                    .inertia_torque_nm = inertia_nm,
+                                    .speed_rad_s = bench.speed_rad_s,
+                                    .feed = Feed::kUnknown,
+                                    .valid = true});
+    EXPECT_FALSE(bench.output.in_cut) << k;
+  }
+  bench.idle(1.0F);
+  EXPECT_FALSE(bench.output.in_cut);
+  EXPECT_NEAR(bench.error_nm(), 0.0F, 0.015F);
+}
+
 TEST(IdleTare, TakesTheWordOfTheCnc) {
   Bench bench;
   bench.coulomb_nm = 3.0F;  // far from the machine file: alone it would call this a cut
