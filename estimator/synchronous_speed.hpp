@@ -1,0 +1,142 @@
+// Synchronous speed of an induction motor, from its voltages and currents alone.
+//   w_e = sum of the angles between successive vectors / window time            (E26)
+//   w_s = w_e / p                                                               (E27)
+// The vector is the line current, or the rotor flux
+//   psi' = v - R_s i - lambda psi (trapezoidal rule),  psi_R = psi - L_sigma i  (E28)
+// whose angle does not jump with the load. The leak lambda forgets the starting value; it turns
+// and shrinks a steady flux, which does not change its rotation, and the shrinkage is undone in
+// the published magnitude.
+// From slip instead, with the rotor's resistance R_R and the rotor speed w_M:
+//   w_s = (w_M + sqrt(w_M^2 + 4 k P_g))/2,  k = 2 R_R/(3 p^2 |psi_R|^2)         (E29)
+// All quantities star-equivalent, inverse-Gamma model (R_R, L_sigma on the stator side).
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <expected>
+#include <optional>
+#include <type_traits>
+
+#include "estimator/space_vector.hpp"
+
+namespace cutforce::estimator {
+
+// (E29); all in SI, flux_square_v2s2 = |psi_R|^2 > 0, pole_pairs > 0. Signs: a motor that turns
+// backwards has negative speeds and a positive power.
+[[nodiscard]] inline float synchronous_speed_from_slip(float rotor_speed_rad_s,
+                                                       float airgap_power_w,
+                                                       float rotor_resistance_ohm, float pole_pairs,
+                                                       float flux_square_v2s2) noexcept {
+  const float magnitude = rotor_speed_rad_s < 0.0F ? -rotor_speed_rad_s : rotor_speed_rad_s;
+  const float k = rotor_resistance_ohm / (1.5F * pole_pairs * pole_pairs * flux_square_v2s2);
+  const float under = magnitude * magnitude + 4.0F * k * airgap_power_w;
+  const float speed = 0.5F * (magnitude + std::sqrt(under > 0.0F ? under : 0.0F));
+  return rotor_speed_rad_s < 0.0F ? -speed : speed;
+}
+
+class SynchronousSpeed {
+ public:
+  enum class Vector : std::uint8_t { kCurrent, kFlux };
+  enum class ConfigError : std::uint8_t {
+    kSamplePeriod,
+    kWindow,
+    kPolePairs,
+    kMotor,
+    kLeak,
+    kLimits,
+  };
+
+  struct Config {
+    float sample_period_s;
+    std::uint32_t samples_per_window;
+    Vector vector;
+    float pole_pairs;
+    float stator_resistance_ohm;
+    float leakage_inductance_h;      // 0: the stator flux is taken for the rotor flux
+    float flux_leak_rad_s;           // lambda
+    float minimum_current_a;         // root mean square of |i| below which nothing is valid
+    float minimum_electrical_rad_s;  // below it nothing is valid
+
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
+      if (!(sample_period_s > 0.0F && sample_period_s <= 1.0F)) {
+        return std::unexpected{ConfigError::kSamplePeriod};
+      }
+      if (samples_per_window < 5 || samples_per_window > 1000000) {
+        return std::unexpected{ConfigError::kWindow};
+      }
+      if (!(pole_pairs >= 1.0F && pole_pairs < 100.0F)) {
+        return std::unexpected{ConfigError::kPolePairs};
+      }
+      if (!(stator_resistance_ohm >= 0.0F && stator_resistance_ohm < 1e4F &&
+            leakage_inductance_h >= 0.0F && leakage_inductance_h < 10.0F)) {
+        return std::unexpected{ConfigError::kMotor};
+      }
+      if (!(flux_leak_rad_s > 0.0F && flux_leak_rad_s * sample_period_s < 1.0F)) {
+        return std::unexpected{ConfigError::kLeak};
+      }
+      if (!(minimum_current_a >= 0.0F && minimum_electrical_rad_s > 0.0F)) {
+        return std::unexpected{ConfigError::kLimits};
+      }
+      return {};
+    }
+  };
+
+  struct Output {
+    float electrical_rad_s;       // stator frequency, mean over the window
+    float synchronous_rad_s;      // the same at the shaft, w_s
+    float synchronous_end_rad_s;  // mean over the last fifth of the window: its end, for inertia
+    float flux_square_v2s2;       // |psi_R|^2, mean over the window
+    bool valid;
+  };
+
+  struct State {
+    SpaceVector flux_vs{0.0F, 0.0F};  // stator flux
+    SpaceVector emf_v{0.0F, 0.0F};    // of the sample before
+    SpaceVector vector{0.0F, 0.0F};   // whose rotation is counted, of the sample before
+    float angle_rad = 0.0F;           // sums over the window so far
+    float angle_end_rad = 0.0F;
+    float flux_square_v2s2 = 0.0F;
+    float current_square_a2 = 0.0F;
+    std::uint32_t sample = 0;
+    std::uint32_t started = 0;  // 0: there is no sample before the next one
+  };
+
+  // Fails iff check() does.
+  [[nodiscard]] static constexpr std::expected<SynchronousSpeed, ConfigError> make(
+      const Config& config) noexcept {
+    if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+    return SynchronousSpeed{config};
+  }
+
+  // One raw sample; an output with the last sample of each window. Needs at least three samples
+  // to an electrical period.
+  [[nodiscard]] std::optional<Output> step(const MotorSample& sample) noexcept;
+
+  // Drops the window and the flux so far. For gaps in the signals.
+  constexpr void restart() noexcept { state_ = {}; }
+
+  [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
+  constexpr void restore(const State& state) noexcept { state_ = state; }
+
+ private:
+  explicit constexpr SynchronousSpeed(const Config& config) noexcept
+      : config_(config),
+        flux_keep_((1.0F - 0.5F * config.flux_leak_rad_s * config.sample_period_s) /
+                   (1.0F + 0.5F * config.flux_leak_rad_s * config.sample_period_s)),
+        flux_gain_s_(0.5F * config.sample_period_s /
+                     (1.0F + 0.5F * config.flux_leak_rad_s * config.sample_period_s)),
+        end_samples_(config.samples_per_window / 5) {}
+
+  void integrate_flux(const MotorSample& sample) noexcept;
+  [[nodiscard]] Output close_window() noexcept;
+
+  Config config_;
+  float flux_keep_;
+  float flux_gain_s_;
+  std::uint32_t end_samples_;
+  State state_{};
+};
+
+static_assert(std::is_trivially_copyable_v<SynchronousSpeed>);
+
+}  // namespace cutforce::estimator

@@ -1,0 +1,215 @@
+// P3's estimators `measured`, `computed` and `synthesized`: raw samples in, cutting torque with its
+// uncertainty out at the end of each window (20 Hz in the paper).
+//
+//   v, i -> AirGapPower -> P_g ---+-> / w -> T_e -> DriveModel -> T_t -> less T_fco -> LoadFriction
+//        -> SynchronousSpeed -> w |                                ^                        |
+//   meter -> MeasuredPower -> P_o +                            IdleTare        SynthesizedMonitor
+//
+// Both powers are followed all the time; the method says which one feeds the output. T_e = P/w
+// with the rotor speed is P3 (4); with the synchronous speed it is P3 (1), which has no slip error.
+// Without a speed sensor the rotor speed is the synchronous speed less the slip that torque and
+// rotor resistance give. Torques carry the sign of the shaft; within, everything is reckoned in
+// the direction of rotation. The sum of uncertainties is (E48), EQUATIONS.md.
+#pragma once
+
+#include <cstdint>
+#include <expected>
+#include <optional>
+#include <type_traits>
+
+#include "estimator/air_gap_power.hpp"
+#include "estimator/drive_model.hpp"
+#include "estimator/idle_tare.hpp"
+#include "estimator/load_friction.hpp"
+#include "estimator/measured_power.hpp"
+#include "estimator/space_vector.hpp"
+#include "estimator/synchronous_speed.hpp"
+#include "estimator/synthesized_monitor.hpp"
+
+namespace cutforce::estimator {
+
+class TorquePath {
+ public:
+  enum class Method : std::uint8_t { kMeasured, kComputed, kSynthesized };
+  enum class Speed : std::uint8_t { kRotor, kSynchronous, kSlip };
+  enum class Origin : std::uint8_t { kNone, kMeasured, kComputed };
+
+  // Which part refuses; its own check() says more. kPeriods: the parts disagree about the window.
+  enum class ConfigError : std::uint8_t {
+    kAirGapPower,
+    kSynchronousSpeed,
+    kMeasuredPower,
+    kDriveModel,
+    kLoadFriction,
+    kIdleTare,
+    kSynthesizedMonitor,
+    kPeriods,
+    kMotor,
+    kUncertainty,
+    kMinimumSpeed,
+  };
+
+  struct Config {
+    Method method;
+    Speed speed;  // that the power is divided by
+    AirGapPower::Config power;
+    SynchronousSpeed::Config synchronous;
+    MeasuredPower::Config meter;
+    DriveModel::Config drive;
+    LoadFriction::Config load_friction;
+    IdleTare::Config tare;
+    SynthesizedMonitor::Config monitor;
+    float rotor_resistance_ohm;  // star-equivalent, stator side; 0: slip is not known
+    float rated_torque_nm;
+    float rated_slip_ratio;  // what P3 (4) leaves out at rated torque: uncertainty
+    float stator_resistance_sigma_ratio;
+    float inertia_sigma_ratio;
+    float speed_sigma_rad_s;    // standard deviation of one speed sample
+    float minimum_speed_rad_s;  // no torque below
+
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
+  };
+
+  // One raw sample. What is not valid is not read.
+  struct Input {
+    MotorSample motor;
+    float speed_rad_s;
+    float power_meter_w;
+    bool motor_valid;
+    bool speed_valid;
+    bool meter_valid;
+    Feed feed;
+  };
+
+  // One window. What is not valid is 0.
+  struct Output {
+    float airgap_power_w;     // P_g
+    float measured_power_w;   // P_o
+    float airgap_torque_nm;   // before inertia and friction
+    float load_torque_nm;     // after inertia
+    float cutting_torque_nm;  // after friction
+    float cutting_torque_sigma_nm;
+    float speed_rad_s;        // rotor, mean over the window
+    float synchronous_rad_s;  // from the signals
+    float idle_torque_nm;     // the tare at this speed, its sigma and its age
+    float idle_torque_sigma_nm;
+    float tare_age_s;
+    bool airgap_power_valid;
+    bool measured_power_valid;
+    bool speed_valid;
+    bool torque_valid;  // all three torques and sigma
+    bool in_cut;
+    bool tared;
+    Origin origin;
+  };
+
+  // What the composition itself keeps between samples.
+  struct Sums {
+    float speed_rad_s = 0.0F;  // over the window so far
+    float meter_w = 0.0F;
+    float last_speed_rad_s = 0.0F;
+    std::uint32_t motor_samples = 0;  // valid ones in the window so far
+    std::uint32_t speed_samples = 0;
+    std::uint32_t meter_samples = 0;
+    std::uint32_t continued = 0;          // 0: there is no sample before the next one
+    float electrical_rad_s = 0.0F;        // of the window before
+    float idle_current_square_a2 = 0.0F;  // where the tare was taken
+    float cutting_torque_nm = 0.0F;       // of the window before
+    std::uint32_t has_torque = 0;         // whether it had one
+  };
+
+  struct State {
+    AirGapPower::State power;
+    SynchronousSpeed::State synchronous;
+    MeasuredPower::State meter;
+    DriveModel::State drive;
+    IdleTare::State tare;
+    SynthesizedMonitor::State monitor;
+    Sums sums;
+  };
+
+  // Fails iff check() does.
+  [[nodiscard]] static std::expected<TorquePath, ConfigError> make(const Config& config) noexcept;
+
+  // One raw sample; an output with the last sample of each window.
+  [[nodiscard]] std::optional<Output> step(const Input& input) noexcept;
+
+  // Samples are missing: the window begins anew, what was learned stays.
+  void restart() noexcept;
+
+  [[nodiscard]] State state() const noexcept;
+  void restore(const State& state) noexcept;
+
+ private:
+  struct Blocks {
+    AirGapPower power;
+    SynchronousSpeed synchronous;
+    MeasuredPower meter;
+    DriveModel drive;
+    LoadFriction friction;
+    IdleTare tare;
+    SynthesizedMonitor monitor;
+  };
+  struct Window;    // means over the window, in the direction of rotation
+  struct Estimate;  // one torque with its share of the uncertainty
+  struct Load;      // what inertia and friction take
+
+  TorquePath(const Config& config, const Blocks& blocks) noexcept
+      : config_(config), blocks_(blocks) {}
+
+  [[nodiscard]] Output close_window(const AirGapPower::Output& power,
+                                    const SynchronousSpeed::Output& synchronous,
+                                    Feed feed) noexcept;
+  [[nodiscard]] Window window(const AirGapPower::Output& power,
+                              const SynchronousSpeed::Output& synchronous) noexcept;
+  void find_speeds(const SynchronousSpeed::Output& synchronous, Window& window) const noexcept;
+  void estimate_torque(const Window& window, Feed feed, Output& output) noexcept;
+  [[nodiscard]] Estimate computed(const Window& window) const noexcept;
+  [[nodiscard]] Estimate measured(const Window& window) const noexcept;
+  [[nodiscard]] Estimate choose(const Window& window, const Estimate& computed,
+                                const Estimate& measured, Origin& origin) noexcept;
+  [[nodiscard]] Load follow_load(const Window& window, float airgap_torque_nm, Feed feed) noexcept;
+  void publish(const Window& window, const Load& load, const Estimate& chosen,
+               Output& output) noexcept;
+  [[nodiscard]] float torque_variance(const Window& window, const Load& load,
+                                      const Estimate& estimate) const noexcept;
+
+  Config config_;
+  Blocks blocks_;
+  Sums sums_{};
+};
+
+static_assert(std::is_trivially_copyable_v<TorquePath>);
+static_assert(std::is_trivially_copyable_v<TorquePath::State>);
+
+constexpr std::expected<void, TorquePath::ConfigError> TorquePath::Config::check() const noexcept {
+  if (!power.check()) return std::unexpected{ConfigError::kAirGapPower};
+  if (!synchronous.check()) return std::unexpected{ConfigError::kSynchronousSpeed};
+  if (!meter.check()) return std::unexpected{ConfigError::kMeasuredPower};
+  if (!drive.check()) return std::unexpected{ConfigError::kDriveModel};
+  if (!load_friction.check()) return std::unexpected{ConfigError::kLoadFriction};
+  if (!tare.check()) return std::unexpected{ConfigError::kIdleTare};
+  if (!monitor.check()) return std::unexpected{ConfigError::kSynthesizedMonitor};
+  const float window_s = power.sample_period_s * static_cast<float>(power.samples_per_window);
+  const auto same = [](float a, float b) { return a > 0.999F * b && a < 1.001F * b; };
+  if (!(same(synchronous.sample_period_s, power.sample_period_s) &&
+        synchronous.samples_per_window == power.samples_per_window &&
+        same(meter.period_s, window_s) && same(drive.period_s, window_s) &&
+        same(tare.period_s, window_s) && same(monitor.period_s, window_s))) {
+    return std::unexpected{ConfigError::kPeriods};
+  }
+  if (!(rotor_resistance_ohm >= 0.0F && rotor_resistance_ohm < 1e4F && rated_torque_nm > 0.0F)) {
+    return std::unexpected{ConfigError::kMotor};
+  }
+  const auto share = [](float x) { return x >= 0.0F && x < 10.0F; };
+  if (!(share(rated_slip_ratio) && share(stator_resistance_sigma_ratio) &&
+        share(inertia_sigma_ratio) && speed_sigma_rad_s >= 0.0F && speed_sigma_rad_s < 1e4F)) {
+    return std::unexpected{ConfigError::kUncertainty};
+  }
+  if (!(minimum_speed_rad_s > 0.0F && minimum_speed_rad_s < 1e5F)) {
+    return std::unexpected{ConfigError::kMinimumSpeed};
+  }
+  return {};
+}
+
+}  // namespace cutforce::estimator
