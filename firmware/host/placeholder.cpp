@@ -1,1 +1,0 @@
-#include "firmware/loop_output.hpp"
