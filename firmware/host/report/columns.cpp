@@ -50,15 +50,14 @@ class Reader {
       std::string_view text(line.data());
       if (!text.ends_with('\n') && text.size() + 1 >= line.size())
         return fail("the line is longer than 64 KiB", "check that this is a CSV file");
+      // zlib hands out what it has before it says that the rest is missing.
+      if (!text.ends_with('\n') && damaged(file.get())) return cut_short();
       while (text.ends_with('\n') || text.ends_with('\r')) text.remove_suffix(1);
       if (text.empty() || text.starts_with('#')) continue;
       if (auto taken = header_read_ ? row(text) : header(text); !taken)
         return std::unexpected(taken.error());
     }
-    int error = Z_OK;
-    gzerror(file.get(), &error);
-    if (error != Z_OK && error != Z_STREAM_END)
-      return fail("the compressed file is damaged or cut short", "write or copy it again");
+    if (damaged(file.get())) return cut_short();
     if (!header_read_) return fail("there is no header of column names", "check the file");
     return finish();
   }
@@ -74,6 +73,15 @@ class Reader {
   std::unexpected<InputError> fail(std::string what, std::string remedy) const {
     return std::unexpected(InputError{path_.string() + ":" + std::to_string(line_), std::move(what),
                                       std::move(remedy)});
+  }
+
+  static bool damaged(gzFile file) {
+    int error = Z_OK;
+    gzerror(file, &error);
+    return error != Z_OK && error != Z_STREAM_END;
+  }
+  std::unexpected<InputError> cut_short() const {
+    return fail("the compressed file is damaged or cut short", "write or copy it again");
   }
 
   std::expected<void, InputError> header(std::string_view text) {

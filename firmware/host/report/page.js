@@ -33,7 +33,8 @@
     : { word: "Cutting torque", unit: "N m", value: "cutting_torque_nm", sigma: "cutting_torque_sigma_nm", truth: "r.true_cutting_torque_nm" };
 
   const curve = (label, unit, data, ink, more) => ({ label, unit, data, ink, ...more });
-  const truthCurve = (label, unit, key, more) => curve(label, unit, series(key), "truth", { width: 5, ...more });
+  // Truth lies under the estimate as a broad pale line, so that both are seen where they agree.
+  const truthCurve = (label, unit, key, ink = "truth") => curve(label, unit, series(key), ink, { width: 6, pale: true });
   function banded(name, ink, trace) {
     const value = series(trace + "." + load.value), sigma = series(trace + "." + load.sigma);
     return [
@@ -50,9 +51,9 @@
       curve("Computed air-gap power", "W", series("0.airgap_power_w"), "blue")] },
     { title: "Which estimate fed the output, state and faults", strips: true },
     { title: "Torque at the motor: in the air gap, of all loads, and of cutting", height: 260, curves: [
-      truthCurve("True air-gap", "N m", "r.true_airgap_torque_nm", { hidden: true }),
-      truthCurve("True load", "N m", "r.true_load_torque_nm", { hidden: true }),
-      truthCurve("True cutting", "N m", "r.true_cutting_torque_nm"),
+      truthCurve("True air-gap", "N m", "r.true_airgap_torque_nm", "orange"),
+      truthCurve("True load", "N m", "r.true_load_torque_nm", "green"),
+      truthCurve("True cutting", "N m", "r.true_cutting_torque_nm", "blue"),
       curve("Air-gap", "N m", series("0.airgap_torque_nm"), "orange"),
       curve("Load", "N m", series("0.load_torque_nm"), "green"),
       curve("Cutting", "N m", series("0.cutting_torque_nm"), "blue")] },
@@ -115,7 +116,7 @@
   function axes(unit, more) {
     const common = { stroke: color("muted"), font: axisFont, grid: { stroke: color("grid"), width: 1 }, ticks: { show: false } };
     return [
-      { ...common, space: 70, size: 30, gap: 6, values: (u, ticks) => ticks.map((t, k) => (+t.toFixed(6)) + (k === ticks.length - 1 ? " s" : "")) },
+      { ...common, space: 70, size: 26, gap: 6, values: (u, ticks) => ticks.map((t, k) => (+t.toFixed(6)) + (k === ticks.length - 1 ? " s" : "")) },
       { ...common, space: 34, size: 58, gap: 6, values: (u, ticks) => ticks.map((t, k) => (+t.toFixed(6)) + (k === ticks.length - 1 && unit ? " " + unit : "")), ...more },
     ];
   }
@@ -164,7 +165,7 @@
   }
 
   function button(item, plotsOf, indices) {
-    const swatch = element("i", { className: item.band ? "band" : "" });
+    const swatch = element("i", { className: item.band ? "band" : item.pale ? "pale" : "" });
     swatch.style.color = color(item.ink);
     const out = element("output");
     const toggle = element("button", { type: "button" }, swatch, item.label + (item.band ? "" : ", " + item.unit));
@@ -192,7 +193,7 @@
       } else {
         columns.push(item.data);
         options.push({
-          stroke: item.ink === "truth" ? color("truth") + "b0" : color(item.ink), width: item.width || 1.6,
+          stroke: color(item.ink) + (item.pale ? item.ink === "truth" ? "b0" : "70" : ""), width: item.width || 1.6,
           points: { show: false }, show: !item.hidden,
           paths: item.stepped ? uPlot.paths.stepped({ align: -1 }) : undefined,
         });
@@ -307,7 +308,7 @@
     run.traces.forEach((name, k) => {
       const runs = run.strips[k + ".source"];
       if (!runs || !runs.length) return;
-      const words = new Set(runs.map(r => r[2]));
+      const words = new Set(runs.map(r => r[2]).filter(word => word !== "none"));
       if (k === 0 || words.size > 1) rows.push({ kind: "source", label: run.traces.length > 1 ? "Source of " + name : "Source", runs });
     });
     for (const [kind, label] of [["state", "State"], ["fault", "Fault"]]) {
@@ -317,21 +318,19 @@
     if (!rows.length) return;
     let plot;
     const section = panel(spec.title, () => [plot.ctx.canvas]);
-    const key = element("div", { className: "key" });
-    for (const row of rows) {
-      row.out = element("output");
-      row.out.style.textAlign = "left";
-      key.append(element("span", { className: "plain" }, row.label + ":", row.out));
-    }
-    section.append(key);
-    const band = 34, narrow = document.getElementById("plots").clientWidth < 560;
+    const reading = element("output", { className: "reading" });
+    section.querySelector("h2").after(reading);
+    const band = 46;
     const draw = u => {
       const { ctx, bbox } = u, dpr = devicePixelRatio || 1, high = bbox.height / rows.length;
       ctx.save();
       ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
       ctx.font = 12 * dpr + "px sans-serif"; ctx.textBaseline = "middle"; ctx.textAlign = "left";
       rows.forEach((row, n) => {
-        const top = bbox.top + n * high + 4 * dpr, height = high - 8 * dpr;
+        const top = bbox.top + n * high + 18 * dpr, height = high - 22 * dpr;
+        ctx.globalAlpha = 1;
+        ctx.fillStyle = color("muted");
+        ctx.fillText(row.label, bbox.left, top - 8 * dpr);
         for (const [from, to, word] of row.runs) {
           const a = Math.max(u.valToPos(from, "x", true), bbox.left), b = Math.min(u.valToPos(to, "x", true), bbox.left + bbox.width);
           if (b <= a) continue;
@@ -349,22 +348,18 @@
     };
     const values = u => {
       const t = u.cursor.idx === null || u.cursor.idx === undefined ? null : time[u.cursor.idx];
-      for (const row of rows) {
-        const at = t === null ? null : row.runs.find(r => r[0] < t + 1e-9 && t <= r[1] + 1e-9);
-        row.out.textContent = at ? wordText[at[2]] || at[2] : "";
-      }
+      const words = rows.map(row => row.runs.find(r => t !== null && r[0] < t + 1e-9 && t <= r[1] + 1e-9));
+      reading.textContent = t === null ? "" : [t.toFixed(3) + " s", ...words.filter(r => r).map(r => wordText[r[2]] || r[2])].join(" · ");
     };
     const made = { columns: [time, time.map(() => null)], options: [{}, { points: { show: false } }], bands: [] };
     const holder = holderIn(section, spec.title);
     const [x, y] = axes("");
     plot = new uPlot({
-      width: Math.max(holder.clientWidth, 120), height: band * rows.length + 44, pxAlign: 0, legend: { show: false },
+      width: Math.max(holder.clientWidth, 120), height: band * rows.length + 34, pxAlign: 0, legend: { show: false },
       cursor: { y: false, points: { show: false }, drag: { x: true, y: false, dist: 5 }, sync: { key: "run" } },
       scales: { x: { time: false, min: view[0], max: view[1] }, y: { range: [0, rows.length] } },
       series: made.options, padding: [6, 14, 0, 0],
-      axes: [x, { ...y, size: narrow ? 58 : 170, grid: { show: false },
-        splits: () => rows.map((_, n) => rows.length - n - .5),
-        values: () => rows.map(row => narrow ? row.label.split(" ")[0] : row.label) }],
+      axes: [x, { ...y, grid: { show: false }, values: () => [] }],
       hooks: { draw: [draw, u => drawEvents(u, false)], setCursor: [values], setScale: [followZoom] },
     }, made.columns, holder);
     linked.push(plot);
