@@ -16,12 +16,28 @@ constexpr Fault named(float x) noexcept {
   return magnitude(x) < kInfinity ? Fault::kOutOfRange : Fault::kNonFinite;
 }
 
+// The positive end of 10 bits and more lies above this share of the range.
+constexpr float kEnd = 0.998F;
+
+struct Kind {
+  const Triple& value;
+  float limit;
+  float end;
+  unsigned first_bit;
+};
+
 // One comparison clears three channels; only what it does not clear is looked at singly, (E9).
-bool usable(const Triple& x, float limit, float limit_squared, FaultSet& faults) noexcept {
-  if (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] <= limit_squared) return true;
+bool usable(const Kind& kind, FaultSet& faults, std::uint32_t& at_end) noexcept {
+  const Triple& x = kind.value;
+  if (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] < kind.end * kind.end) return true;
   bool good = true;
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (magnitude(x[k]) <= limit) continue;
+  for (unsigned k = 0; k < 3; ++k) {
+    const float size = magnitude(x[k]);
+    if (size < kind.end) continue;
+    if (size <= kind.limit) {
+      at_end |= 1U << (kind.first_bit + k);
+      continue;
+    }
     faults.insert(named(x[k]));
     good = false;
   }
@@ -40,8 +56,8 @@ auto SampleGate::make(const Config& config) noexcept -> std::expected<SampleGate
                      .periods_per_ns = 1.0F / static_cast<float>(period_ns),
                      .voltage_v = config.voltage_limit_v,
                      .current_a = config.current_limit_a,
-                     .voltage_squared_v2 = config.voltage_limit_v * config.voltage_limit_v,
-                     .current_squared_a2 = config.current_limit_a * config.current_limit_a,
+                     .voltage_end_v = kEnd * config.voltage_limit_v,
+                     .current_end_a = kEnd * config.current_limit_a,
                      .speed_rad_s = config.speed_limit_rad_s,
                      .power_w = config.power_limit_w,
                      .bridge = config.bridge_limit,
@@ -57,6 +73,7 @@ auto SampleGate::step(const Input& input) noexcept -> Output {
   Output output{.verdict = Verdict::kAccept,
                 .faults = {},
                 .elapsed_periods = 1.0F,
+                .at_end_channels = 0,
                 .missing_samples = 0,
                 .values = state_.last_good,
                 .present = 0};
@@ -87,6 +104,7 @@ auto SampleGate::refused(FaultSet faults) const noexcept -> Output {
   return {.verdict = Verdict::kDrop,
           .faults = faults,
           .elapsed_periods = 0.0F,
+          .at_end_channels = 0,
           .missing_samples = 0,
           .values = state_.last_good,
           .present = state_.last_present};
@@ -115,10 +133,10 @@ void SampleGate::pass_time(const Input& input, Output& output) const noexcept { 
 
 void SampleGate::pass_channels(const Input& input, Output& output) noexcept {
   const Values& v = input.values;
-  const bool voltages =
-      usable(v.voltage_v, limits_.voltage_v, limits_.voltage_squared_v2, output.faults);
-  const bool currents =
-      usable(v.current_a, limits_.current_a, limits_.current_squared_a2, output.faults);
+  const bool voltages = usable({v.voltage_v, limits_.voltage_v, limits_.voltage_end_v, 0},
+                               output.faults, output.at_end_channels);
+  const bool currents = usable({v.current_a, limits_.current_a, limits_.current_end_a, 3},
+                               output.faults, output.at_end_channels);
   if (voltages && currents) {
     output.values.voltage_v = v.voltage_v;
     output.values.current_a = v.current_a;

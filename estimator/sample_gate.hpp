@@ -10,8 +10,11 @@
 //
 // Every comparison is written so that NaN falls on the side of refusal.
 //
+// A channel at the end of its range is let through and reported; whether it is clipped is told by
+// SignalHealth.
+//
 // Cost of a good sample: 6 multiplications, 4 additions and 2 comparisons for six channels, because
-// |x|^2 summed over three channels within limit^2 clears all three at once (E9); one 64-bit
+// |x|^2 summed over three channels below (0.998 limit)^2 clears all three at once (E9); one 64-bit
 // subtraction and two comparisons for the time; one comparison each for speed and power.
 #pragma once
 
@@ -30,7 +33,7 @@ class SampleGate {
 
   struct Config {
     float sample_period_s;      // nominal
-    float voltage_limit_v;      // of a raw channel, in magnitude; likewise below
+    float voltage_limit_v;      // end of the sensor's range, in magnitude; likewise below
     float current_limit_a;
     float speed_limit_rad_s;
     float power_limit_w;
@@ -74,6 +77,7 @@ class SampleGate {
     FaultSet faults;
     float elapsed_periods;          // since the last sample that passed; 1 within 1 % of nominal;
                                     // 1 on the first sample and on a restart; 0 on a drop
+    std::uint32_t at_end_channels;  // bit 0..2 voltages, 3..5 currents: within 0.2 % of the limit
     std::uint32_t missing_samples;  // nominal samples between the last one that passed and this
     Values values;                  // finite and in range whatever the verdict
     std::uint32_t present;
@@ -106,8 +110,8 @@ class SampleGate {
     float periods_per_ns;
     float voltage_v;
     float current_a;
-    float voltage_squared_v2;
-    float current_squared_a2;
+    float voltage_end_v;       // from here on a channel counts as at its end
+    float current_end_a;
     float speed_rad_s;
     float power_w;
     std::uint32_t bridge;

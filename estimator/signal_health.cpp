@@ -68,6 +68,7 @@ void SignalHealth::next_place() noexcept {
   state_.place = state_.place + 1 < samples ? state_.place + 1 : 0;
   state_.countdown = state_.place;
   state_.is_picked = 0;
+  state_.at_end_channels = 0;
 }
 
 void SignalHealth::judge_channels(const Tick& tick) noexcept {
@@ -106,12 +107,11 @@ void SignalHealth::judge_stuck(const Tick& tick, std::size_t k, bool others_move
 }
 
 void SignalHealth::judge_clipped(const Tick& tick, std::size_t k, float value) noexcept {  // (E19)
-  constexpr float kEnd = 0.998F;  // the positive end of 10 bits and more lies above it
   constexpr float kUnknownPeriod_s = 0.05F;
   Channel& channel = state_.channel[k];
   channel.clip_s = std::min(channel.clip_s + tick.elapsed_s, 1e3F);
   const float range = k < 3 ? config_.voltage_range_v : config_.current_range_a;
-  const bool at_end = std::fabs(value) >= kEnd * range;
+  const bool at_end = (state_.at_end_channels >> k & 1U) != 0;
   const bool was_flat = k >= 3 && tick.period_s > 0.0F && !same(value, channel.held) &&
                         channel.same_count >= 3 && channel.same_s >= tick.period_s / 12.0F &&
                         channel.same_s < 0.4F * tick.period_s &&

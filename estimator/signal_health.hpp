@@ -13,7 +13,7 @@
 //   raw_pwm        see raw_pwm.hpp; or for 0.15 s a voltage below 5 % of what rated flux induces; or
 //                  for 1.5 s at steady frequency the flux |v - R_s i|/w_e outside 0.3 to 1.5 of its
 //                  rated value
-//   clipped        within one electrical period twice at the end of the range, or a current twice
+//   clipped        within one electrical period in two ticks at the end of the range, or a current twice
 //                  flat for more than T_e/12 (voltages may be: a line voltage in overmodulation is)
 //
 // Nothing that needs rotation is judged below `minimum_frequency_rad_s`, with the frequency unknown,
@@ -82,6 +82,7 @@ class SignalHealth {
     MotorSample motor;
     float current_residual_a;
     float elapsed_periods;           // as the gate says
+    std::uint32_t at_end_channels;   // likewise
   };
 
   struct Input {
@@ -108,6 +109,7 @@ class SignalHealth {
   struct State {
     std::array<Channel, kChannels> channel{};
     Observation picked{};                 // this tick's observation
+    std::uint32_t at_end_channels = 0;    // of any sample since then
     float elapsed_periods = 0.0F;         // since the previous tick's observation
     std::int32_t countdown = 0;           // to the sample to pick
     std::int32_t place = 0;               // of that sample in its tick
@@ -135,6 +137,7 @@ class SignalHealth {
   // Every sample that passed the gate.
   void observe(const Observation& observation) noexcept {
     state_.elapsed_periods += observation.elapsed_periods;
+    state_.at_end_channels |= observation.at_end_channels;
     if (state_.countdown-- == 0) {
       state_.picked = observation;
       state_.picked.elapsed_periods = state_.elapsed_periods;

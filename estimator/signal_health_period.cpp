@@ -142,7 +142,8 @@ void SignalHealth::judge_order(float frequency_rad_s,
                      i.minor > kMinorShare * i_size ||
                      result.residual_a > 3.0F * kMinorShare * i_size;
   state_.order_s = wrong ? state_.order_s + state_.window_s : 0.0F;
-  if (state_.order_s >= kOrderPatience_s) raise(Fault::kPhaseOrder);
+  // Two windows at least: one that holds a step of the load is no sine.
+  if (state_.order_s >= std::max(kOrderPatience_s, 1.9F * state_.window_s)) raise(Fault::kPhaseOrder);
 
   const bool reverse =
       dot(v.major, i.major) < -0.2F * apparent || reactive < -0.1F * apparent;
@@ -169,8 +170,9 @@ void SignalHealth::judge_flux(const Tick& tick, const PeriodPhasors::Result& res
   const Senses i = senses(result.current_a);
   const float rated = config_.rated_flux_v_s;
   if (!(rated > 0.0F) || !(frequency >= kFluxFrom * config_.rated_frequency_rad_s) ||
-      !(size(i.major) >= config_.current_floor_a)) {
-    state_.flux_s = 0.0F;
+      !(size(i.major) >= config_.current_floor_a) || state_.order_s > 0.0F ||
+      state_.reverse_s > 0.0F) {
+    state_.flux_s = 0.0F;  // of a wrong wiring the flux tells nothing
     return;
   }
   const float r = config_.stator_resistance_ohm;  // (E18)

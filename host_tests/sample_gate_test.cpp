@@ -57,7 +57,7 @@ void set(SampleGate::Values& v, std::size_t k, float x) {
 
 bool bits_equal(const SampleGate::Output& a, const SampleGate::Output& b) {
   return a.verdict == b.verdict && a.faults == b.faults && a.present == b.present &&
-         a.missing_samples == b.missing_samples &&
+         a.missing_samples == b.missing_samples && a.at_end_channels == b.at_end_channels &&
          std::bit_cast<std::uint32_t>(a.elapsed_periods) ==
              std::bit_cast<std::uint32_t>(b.elapsed_periods) &&
          std::bit_cast<std::array<std::uint32_t, 8>>(a.values) ==
@@ -118,10 +118,27 @@ TEST(SampleGate, AcceptsWhatLiesAtTheLimitAndNothingBeyond) {
   SampleGate::Input in = good(0);
   in.values.voltage_v = {800.0F, -800.0F, 800.0F};
   in.values.current_a = {-30.0F, 30.0F, 30.0F};
-  EXPECT_EQ(gate.step(in).verdict, Verdict::kAccept);
+  const auto out = gate.step(in);
+  EXPECT_EQ(out.verdict, Verdict::kAccept);
+  EXPECT_EQ(out.at_end_channels, 0b111111U);
   in.time_ns += kMs;
   in.values.current_a[1] = std::nextafter(30.0F, 31.0F);
   EXPECT_EQ(gate.step(in).verdict, Verdict::kBridge);
+}
+
+TEST(SampleGate, ReportsExactlyTheChannelsAtTheirEnds) {
+  for (unsigned k = 0; k < 6; ++k) {
+    const float limit = k < 3 ? 800.0F : 30.0F;
+    for (const float sign : {1.0F, -1.0F}) {
+      auto gate = SampleGate::make(kGate).value();
+      SampleGate::Input in = good(0, 0.0F);
+      set(in.values, k, sign * limit * 2047.0F / 2048.0F);
+      EXPECT_EQ(gate.step(in).at_end_channels, 1U << k);
+      in.time_ns += kMs;
+      set(in.values, k, sign * limit * 0.997F);
+      EXPECT_EQ(gate.step(in).at_end_channels, 0U);
+    }
+  }
 }
 
 TEST(SampleGate, BridgesASlowValueAloneThenSaysItIsNotThere) {

@@ -157,7 +157,7 @@ Verdict run(const Recording& r, const Condition& c) {
     const auto out = front_end.step({volts, amperes});
     const double elapsed_s = n == 0 ? sample_s : r.time_s[n] - r.time_s[n - 1];
     health.observe({volts, amperes, out.motor, out.current_residual_a,
-                    static_cast<float>(elapsed_s / sample_s)});
+                    static_cast<float>(elapsed_s / sample_s), 0});
     const float frequency = c.sensorless
                                 ? follower.step(out.motor.current_a, static_cast<float>(elapsed_s))
                                 : pole_pairs * speed[n];
