@@ -10,8 +10,8 @@
 // Assumes a three-wire motor: the zero sequence carries no power and does not appear in a vector.
 // A delta winding needs no other formula, only a third of its phase resistance (E8).
 //
-// Gains, offsets and Clarke matrix are one affine map, so a sample costs 14 multiplications and
-// 14 additions to two vectors with compensation of the lead, and 3 + 3 for the residual where it is
+// Gains, offsets and Clarke matrix are one affine map, so a sample costs 15 multiplications and
+// 13 additions to two vectors with compensation of the lead, and 3 + 3 for the residual where it is
 // used. No division, no branch, no call.
 #pragma once
 

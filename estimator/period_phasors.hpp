@@ -9,7 +9,7 @@
 // that frequency at all is told by `coherence`. A constant offset drops out. The window ends with the
 // first whole period that holds kLeastObservations.
 //
-// Cost of an observation: 26 multiplications and 33 additions for the sums, about 25 operations for
+// Cost of an observation: 24 multiplications and 30 additions for the sums, about 25 operations for
 // sine and cosine; no division. Errors of sine and cosine: below 1e-6.
 #pragma once
 

@@ -12,7 +12,7 @@
 //
 // Two windows in a row decide. Not judged: corners where the sampling is in step with six times the
 // frequency, so that a good sine would sit on them (zero share still is).
-// Cost of an observation: 17 multiplications, 10 additions, 1 division.
+// Cost of an observation: 19 multiplications, 10 additions, 1 division.
 #pragma once
 
 #include <cstdint>
