@@ -1,0 +1,151 @@
+// The tick and the rules that look at single channels. What looks at whole electrical periods is in
+// signal_health_period.cpp.
+#include "estimator/signal_health.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace cutforce::estimator {
+namespace {
+
+constexpr float kTurn = 6.28318531F;
+constexpr std::uint32_t kSpeedBit = 1U << 6;
+
+// Values are compared to tell whether a converter delivered another code, so equality is meant.
+constexpr bool same(float a, float b) noexcept { return !(a < b) && !(a > b); }
+
+}  // namespace
+
+auto SignalHealth::make(const Config& config) noexcept -> std::expected<SignalHealth, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return SignalHealth{config};
+}
+
+void SignalHealth::raise(Fault fault) noexcept {
+  // Half a tick more, so that a hold of 0 still shows for the tick that saw it.
+  state_.left_s[static_cast<std::size_t>(fault)] = config_.hold_s + 0.5F * config_.tick_period_s;
+}
+
+auto SignalHealth::step(const Input& input) noexcept -> Output {
+  for (float& left : state_.left_s) left = std::max(left - config_.tick_period_s, 0.0F);
+  const float magnitude = std::fabs(input.frequency_rad_s);
+  const bool turning = magnitude >= config_.minimum_frequency_rad_s && magnitude < 1e6F;
+  if (state_.is_picked != 0) {
+    const Observation& o = state_.picked;
+    const float elapsed_s = o.elapsed_periods * config_.sample_period_s;
+    const Tick tick{
+        .frequency_rad_s = input.frequency_rad_s,
+        .period_s = turning ? kTurn / magnitude : 0.0F,
+        .elapsed_s = elapsed_s,
+        .sample = {.channel = {o.voltage_v[0], o.voltage_v[1], o.voltage_v[2], o.current_a[0],
+                               o.current_a[1], o.current_a[2]},
+                   .motor = o.motor,
+                   .current_residual_a = o.current_residual_a,
+                   .angle_rad = turning ? input.frequency_rad_s * elapsed_s : 0.0F}};
+    judge_channels(tick);
+    judge_rotation(tick);
+  }
+  next_place();
+  if (turning && input.speed_present) judge_speed(input);
+
+  const auto over = [this](Fault fault) {
+    return !(state_.left_s[static_cast<std::size_t>(fault)] > 0.0F);
+  };
+  if (over(Fault::kStuckChannel)) state_.seen.stuck_channels = 0;
+  if (over(Fault::kLostPhase)) state_.seen.lost_channels = 0;
+  if (over(Fault::kClipped)) state_.seen.clipped_channels = 0;
+  Output output = state_.seen;
+  for (std::size_t k = 0; k < kFaultCount; ++k)
+    if (state_.left_s[k] > 0.0F) output.faults.insert(static_cast<Fault>(k));
+  if (state_.raw_latched != 0) output.faults.insert(Fault::kRawPwm);
+  return output;
+}
+
+// The next tick's observation is one sample later in its tick than this one's, cyclically.
+void SignalHealth::next_place() noexcept {
+  const std::int32_t samples = state_.place - state_.countdown;
+  state_.place = state_.place + 1 < samples ? state_.place + 1 : 0;
+  state_.countdown = state_.place;
+  state_.is_picked = 0;
+  state_.at_end_channels = 0;
+}
+
+void SignalHealth::judge_channels(const Tick& tick) noexcept {
+  for (std::size_t kind = 0; kind < 2; ++kind) {
+    const std::size_t first = 3 * kind;
+    const std::size_t end = first + measured(kind);
+    std::size_t moving = end;  // a channel of this kind that has just changed
+    for (std::size_t k = first; k < end; ++k) {
+      Channel& channel = state_.channel[k];
+      const float value = tick.sample.channel[k];
+      judge_clipped(tick, k, value);
+      if (!same(value, channel.held)) {
+        channel = {.held = value, .same_s = 0.0F, .clip_s = channel.clip_s, .same_count = 0};
+        moving = k;
+        continue;
+      }
+      channel.same_s += tick.elapsed_s;
+      ++channel.same_count;
+    }
+    for (std::size_t k = first; k < end; ++k) judge_stuck(tick, k, moving != end);
+  }
+}
+
+void SignalHealth::judge_stuck(const Tick& tick, std::size_t k, bool others_move) noexcept {
+  const Channel& channel = state_.channel[k];
+  if (!(tick.period_s > 0.0F) || !others_move || channel.same_count < 4) return;
+  const std::size_t first = k < 3 ? 0 : 3;
+  const float floor = first == 0 ? config_.voltage_floor_v : config_.current_floor_a;
+  const auto& a = state_.amplitude;
+  if (!(std::max({a[first], a[first + 1], a[first + 2]}) >= floor)) return;
+  const float bound_s =  // (E11)
+      std::max(tick.period_s / 6.0F, std::min(0.4F * tick.period_s, 18e-3F));
+  if (!(channel.same_s >= bound_s)) return;
+  raise(Fault::kStuckChannel);
+  state_.seen.stuck_channels |= 1U << k;
+}
+
+void SignalHealth::judge_clipped(const Tick& tick, std::size_t k, float value) noexcept {  // (E19)
+  constexpr float kUnknownPeriod_s = 0.05F;
+  Channel& channel = state_.channel[k];
+  channel.clip_s = std::min(channel.clip_s + tick.elapsed_s, 1e3F);
+  const float range = k < 3 ? config_.voltage_range_v : config_.current_range_a;
+  const bool at_end = (state_.at_end_channels >> k & 1U) != 0;
+  const bool was_flat = k >= 3 && tick.period_s > 0.0F && !same(value, channel.held) &&
+                        channel.same_count >= 3 && channel.same_s >= tick.period_s / 12.0F &&
+                        channel.same_s < 0.4F * tick.period_s &&
+                        state_.amplitude[k] >= 0.1F * range &&
+                        std::fabs(channel.held - state_.mean[k]) >= 0.5F * state_.amplitude[k];
+  if (!at_end && !was_flat) return;
+  const float period_s = tick.period_s > 0.0F ? tick.period_s : kUnknownPeriod_s;
+  if (channel.clip_s <= period_s) {
+    raise(Fault::kClipped);
+    state_.seen.clipped_channels |= 1U << k;
+  }
+  channel.clip_s = 0.0F;
+}
+
+void SignalHealth::judge_speed(const Input& input) noexcept {
+  constexpr float kPatience_s = 0.5F;
+  constexpr float kChange = 0.2F;  // of the frequency; slip alone changes it by less
+  const float frequency = std::fabs(input.frequency_rad_s);
+  // At the start the frequency may climb some way before the shaft comes loose.
+  const bool fast = frequency >= std::max(0.15F * config_.rated_frequency_rad_s,
+                                          2.0F * config_.minimum_frequency_rad_s);
+  if (!fast || !same(input.speed_rad_s, state_.speed_held_rad_s)) {
+    state_.speed_held_rad_s = input.speed_rad_s;
+    state_.speed_same_s = 0.0F;
+    state_.speed_frequency_rad_s = frequency;
+    return;
+  }
+  state_.speed_same_s += config_.tick_period_s;
+  const float before = state_.speed_frequency_rad_s;
+  if (!(state_.speed_same_s >= kPatience_s) ||
+      !(std::fabs(frequency - before) > kChange * std::max(frequency, before)))
+    return;
+  raise(Fault::kStuckChannel);
+  state_.seen.stuck_channels |= kSpeedBit;
+}
+
+}  // namespace cutforce::estimator

@@ -1,0 +1,167 @@
+// The one control loop: raw samples in, estimate and override out. This text runs on every target
+// and under every test; a composition root gives it a port.
+//
+//   sample -> SampleGate -> FrontEnd -> FusedObserver | TorquePath -> CuttingForce -> ControlPath
+//                              ^ IdleCalibration, SignalHealth                     -> Command
+//
+// Two rates hang on the sample count, no clock is read: the estimate period (1 ms) and the control
+// period (50 ms, whole estimate periods). Time stamps mark the end of the window they describe.
+// The whole loop is a value: state() and restore() continue bit for bit.
+#pragma once
+
+#include <cstdint>
+#include <expected>
+#include <optional>
+#include <span>
+#include <type_traits>
+
+#include "control/control_path.hpp"
+#include "estimator/cutting_force.hpp"
+#include "estimator/front_end.hpp"
+#include "estimator/fused_observer.hpp"
+#include "estimator/idle_calibration.hpp"
+#include "estimator/load_friction.hpp"
+#include "estimator/sample_gate.hpp"
+#include "estimator/signal_health.hpp"
+#include "estimator/torque_path.hpp"
+#include "firmware/loop_output.hpp"
+#include "firmware/machine.hpp"
+#include "hal/port.hpp"
+
+namespace cutforce::firmware {
+
+class ControlLoop {
+ public:
+  // Which part refuses its configuration; the part's own check() says more.
+  enum class ConfigError : std::uint8_t {
+    kGate,
+    kFrontEnd,
+    kHealth,
+    kCalibration,
+    kFused,
+    kTorquePath,
+    kLoadFriction,
+    kCuttingForce,
+    kControl,
+    kPeriods,
+  };
+
+  struct Config {
+    EstimatorName estimator;
+    bool control;                       // false: no controller, the override stays neutral
+    bool current_w_present;
+    std::uint32_t samples_per_estimate;
+    std::uint32_t estimates_per_control;
+    float fixed_diameter_m;             // used where the samples bring none; 0: not known
+    float dynamometer_sigma_n;
+    bool feed_signal;                   // believe feed_active where it is present
+    estimator::SampleGate::Config gate;
+    estimator::FrontEnd::Config front_end;
+    estimator::SignalHealth::Config health;
+    estimator::IdleCalibration::Config calibration;
+    estimator::FusedObserver::Config fused;
+    estimator::TorquePath::Config path;
+    estimator::LoadFriction::Config load_friction;
+    estimator::CuttingForce::Config force;
+    control::ControlPath::Config controller;
+  };
+
+  // What the loop itself keeps between samples.
+  struct Own {
+    std::int64_t time_ns = 0;
+    float elapsed_periods = 0.0F;       // in the estimate window so far
+    float control_periods = 0.0F;       // estimate windows in the control period so far
+    float calibrated_s = 0.0F;          // of idle calibration so far
+    float diameter_m = 0.0F;
+    float force_n = 0.0F;               // mean over the control period so far
+    float force_sigma_n = 0.0F;
+    std::uint32_t force_count = 0;
+    float dynamometer_n = 0.0F;
+    std::uint32_t dynamometer_count = 0;
+    estimator::FaultSet faults{};       // since the last output
+    std::uint32_t feed = 0;             // 0 unknown, 1 idle, 2 active
+    std::uint32_t refused = 0;          // the signals cannot carry an estimate
+    std::uint32_t enabled = 1;
+    std::uint32_t override_reported = 0;
+    float override_reported_pct = 0.0F;
+    estimator::Calibration calibration{};
+    LoopOutput last{};
+  };
+
+  struct State {
+    estimator::SampleGate::State gate;
+    estimator::FrontEnd::State front_end;
+    estimator::SignalHealth::State health;
+    estimator::IdleCalibration::State calibration;
+    estimator::FusedObserver::State fused;
+    estimator::TorquePath::State path;
+    control::ControlPath::State controller;
+    Own own;
+  };
+
+  [[nodiscard]] static std::expected<ControlLoop, ConfigError> make(const Config& config) noexcept;
+
+  // One raw sample; an output with the sample that ends an estimate period.
+  [[nodiscard]] std::optional<LoopOutput> step(const hal::Sample& sample) noexcept;
+
+  // Of the last control tick; before the first, the neutral override.
+  [[nodiscard]] const hal::Command& command() const noexcept { return command_; }
+
+  [[nodiscard]] State state() const noexcept;
+  void restore(const State& state) noexcept;
+
+ private:
+  explicit ControlLoop(const Config& config) noexcept;
+
+  struct Estimate {
+    LoopOutput output;
+    float speed_rad_s;
+    bool torque_valid;
+  };
+  void restart() noexcept;
+  void note_commands(const hal::Sample& sample) noexcept;
+  void calibrate(const estimator::FusedObserver::Output& fused) noexcept;
+  [[nodiscard]] LoopOutput close_estimate() noexcept;
+  void estimate_fused(LoopOutput& out) noexcept;
+  void publish_path(const estimator::TorquePath::Output& path) noexcept;
+  void add_force(float speed_rad_s, LoopOutput& out) noexcept;
+  void control_tick(LoopOutput& out) noexcept;
+
+  Config config_;
+  estimator::SampleGate gate_;
+  estimator::FrontEnd front_end_;
+  estimator::SignalHealth health_;
+  estimator::IdleCalibration calibration_;
+  estimator::FusedObserver fused_;
+  estimator::TorquePath path_;
+  estimator::LoadFriction load_friction_;
+  estimator::CuttingForce force_;
+  control::ControlPath controller_;
+  Own own_{};
+  hal::Command command_{};
+};
+
+static_assert(std::is_trivially_copyable_v<ControlLoop>);
+
+// Runs until the port's data ends or the port fails. `sink` sees every LoopOutput.
+template <hal::Port P, class Sink>
+[[nodiscard]] std::expected<void, hal::PortError> run(P& port, ControlLoop& loop,
+                                                      std::span<hal::Sample> block, Sink&& sink) {
+  for (;;) {
+    const auto count = port.read(block);
+    if (!count) return std::unexpected{count.error()};
+    if (*count == 0) return {};
+    for (const hal::Sample& sample : block.first(*count)) {
+      if (const std::optional<LoopOutput> out = loop.step(sample); out) {
+        sink(*out);
+        if (out->control_tick) {
+          if (const auto sent = port.write(loop.command()); !sent) {
+            return std::unexpected{sent.error()};
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace cutforce::firmware
