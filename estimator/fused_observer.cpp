@@ -12,6 +12,7 @@ constexpr float kFrequencyTime_s = 0.015F;
 constexpr float kLowestFrequency_rad_s = kTwoPi * 3.0F;
 constexpr float kLock_s = 0.03F;
 constexpr float kInertiaWait_s = 0.1F;       // after the lock: the flux has settled
+constexpr float kEvenTurns = 1.5F;
 constexpr float kUncalibrated_ratio = 0.03F;
 constexpr float kTareFollow_ratio = 0.02F;   // of what the tare belongs to, each tick
 
@@ -98,6 +99,21 @@ void FusedObserver::recalibrated(SpaceVector voltage_offset_v,
   tick_.calibrated = 1;
 }
 
+void FusedObserver::restart() noexcept {
+  FluxTorque::State flux{};
+  flux.leak = flux_.state().leak;
+  flux.gain_s = flux_.state().gain_s;
+  flux.frequency_rad_s = flux_.state().frequency_rad_s;
+  flux_.restore(flux);
+  tick_.locked_s = 0.0F;
+  tick_.acceleration_rad_s2 = 0.0F;
+  tick_.speed_sum_rad_s = 0.0F;
+  tick_.speed_count = 0;
+  tick_.ticks = 0;
+  noise_.restart();
+  ripple_.forget();
+}
+
 auto FusedObserver::rotation(const FluxTorque::Window& window) noexcept -> Rotation {
   const float l = config_.leakage_inductance_h;
   const SpaceVector i = window.current_a;
@@ -115,7 +131,8 @@ void FusedObserver::track_frequency(const Rotation& r, float duration_s) noexcep
   const float w = tick_.frequency_rad_s;
   const float size = magnitude(w);
   const float flux_floor = 0.3F * config_.rated_flux_v_s;
-  const bool flux_agrees = r.flux_squared > flux_floor * flux_floor &&
+  // Until the offsets are taken out they turn the flux angle far more than the current's.
+  const bool flux_agrees = tick_.calibrated != 0 && r.flux_squared > flux_floor * flux_floor &&
                            magnitude(r.flux_rad_s - w) < 0.3F * size + 20.0F &&
                            magnitude(r.current_rad_s - w) < 0.5F * size + 60.0F;
   const float seen = flux_agrees ? r.flux_rad_s : r.current_rad_s;
@@ -170,6 +187,7 @@ auto FusedObserver::unlocked(float speed_rad_s, AirCut::Feed feed, Output out) n
   ripple_.forget();
   static_cast<void>(air_.step({.load_torque_nm = 0.0F,
                                .sigma_nm = 0.0F,
+                               .model_sigma_nm = 0.0F,
                                .airgap_torque_nm = 0.0F,
                                .speed_rad_s = speed_rad_s,
                                .speed_sigma_rad_s = 0.0F,
@@ -222,7 +240,23 @@ void FusedObserver::learn(const FluxTorque::Window& window, const Rotation& r, c
                     .torque_nm = window.torque_nm,
                     .current_squared_a2 = window.current_squared_a2,
                     .duration_s = out.duration_s,
-                    .steady = out.steady && tick_.calibrated != 0});
+                    .steady = tick_.even_s > 0.0F && tick_.calibrated != 0});
+}
+
+auto FusedObserver::delayed(float torque_nm, float moment_nm) noexcept -> std::array<float, 2> {
+  if (config_.speed_delay_ticks == 0) return {torque_nm, moment_nm};
+  constexpr std::uint32_t kSize = kLongestDelay + 1;
+  if (tick_.ticks == 0) {
+    for (std::uint32_t k = 0; k < kSize; ++k) {
+      tick_.delayed_nm[2 * k] = torque_nm;
+      tick_.delayed_nm[2 * k + 1] = moment_nm;
+    }
+  }
+  const std::uint32_t now = 2 * (tick_.ticks % kSize);
+  tick_.delayed_nm[now] = torque_nm;
+  tick_.delayed_nm[now + 1] = moment_nm;
+  const std::uint32_t then = 2 * ((tick_.ticks + kSize - config_.speed_delay_ticks) % kSize);
+  return {tick_.delayed_nm[then], tick_.delayed_nm[then + 1]};
 }
 
 auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
@@ -248,11 +282,13 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
   const bool by_angle = noise_.counts() || config_.sensorless;
   noise.centre_ratio = by_angle ? 0.5F : 0.5F - 0.5F / (speed.samples > 1.0F ? speed.samples : 1.0F);
   if (config_.sensorless) noise.torque_variance *= 4.0F;
+  const float moment =
+      by_angle ? window.moment_nm + 0.5F * window.torque_nm * config_.flux.sample_period_s / h
+               : window.moment_nm;
+  const auto [waited_nm, waited_moment_nm] = delayed(torque, moment);
   const LoadTorqueFilter::Input input{
-      .torque_nm = torque,
-      .moment_nm = by_angle ? window.moment_nm + 0.5F * window.torque_nm *
-                                                     config_.flux.sample_period_s / h
-                            : window.moment_nm,
+      .torque_nm = waited_nm,
+      .moment_nm = waited_moment_nm,
       .speed_rad_s = speed.mean_rad_s,
       .duration_s = h,
       .inertia_kg_m2 = inertia_.inertia_kg_m2(),
@@ -268,6 +304,7 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
   const AirCut::Output air =
       air_.step({.load_torque_nm = load.load_torque_nm,
                  .sigma_nm = std::sqrt(load.variance_nm2),
+                 .model_sigma_nm = magnitude(resistance_.change_sigma_ohm() * copper),
                  .airgap_torque_nm = torque,
                  .speed_rad_s = load.speed_rad_s,
                  .speed_sigma_rad_s =
@@ -278,7 +315,7 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .valid = true});
   const bool idle = air.phase == AirCut::Phase::kIdle;
   if (speed.valid) {
-    noise_.step({.torque_nm = torque,
+    noise_.step({.torque_nm = input.torque_nm,
                  .moment_nm = input.moment_nm,
                  .speed_rad_s = speed.mean_rad_s,
                  .duration_s = h,
@@ -294,8 +331,18 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .tare_nm = air.tare_nm});
 
   out.valid = true;
-  out.steady = air.steady;
+  if (air.steady) {
+    tick_.even_angle_rad += r.current_rad_s * h;
+    tick_.even_s += h;
+  } else {
+    tick_.even_angle_rad = tick_.even_s = 0.0F;
+  }
+  // Channel offsets ripple the angle once a turn of the field: only the mean of turns counts.
+  if (magnitude(tick_.even_angle_rad) > kEvenTurns * kTwoPi) {
+    out.even_frequency_rad_s = tick_.even_angle_rad / tick_.even_s;
+  }
   out.calibrated = tick_.calibrated != 0;
+  out.tared = air.has_tare;
   out.phase = air.phase;
   out.airgap_torque_nm = torque;
   out.load_torque_nm = load.load_torque_nm;

@@ -3,7 +3,7 @@
 // Once a raw sample: FluxTorque, the air-gap torque. Once a tick (1 ms):
 //   frequency  psi_R = psi - L_sigma i;  w_psi = arg(psi_R conj psi_R,prev)/h, w_i likewise   (E100)
 //              w_e += s (w_x - w_e) + a_e h,  a_e += s^2/4 (w_x - w_e)/h,  s = 1 - exp(-h/15 ms)
-//              w_x = w_psi once it agrees, else w_i                                          (E101)
+//              w_x = w_psi once calibrated and agreeing, else w_i                                          (E101)
 //   speed      measured less its ripple, or without a sensor
 //              (w_psi - w_sl)/p, w_sl = 2 R_R T_m / (3 p |psi_R|^2)                            (E102)
 //   noise      NoiseMeter (E103);  ripple  SpeedRipple (E105)
@@ -49,6 +49,7 @@ class FusedObserver {
     PowerScale::Config meter;
     float leakage_inductance_h;      // star-equivalent, inverse-gamma
     float rated_flux_v_s;            // about; decides only what is plausible
+    std::uint32_t speed_delay_ticks; // the measured speed is this late; the torque waits for it
     bool sensorless;                 // speed from the flux
     bool track_resistance;
     bool calibrate;                  // wait for the idle calibration before the first tare
@@ -60,11 +61,14 @@ class FusedObserver {
       if (!inertia.check()) return std::unexpected{ConfigError::kInertia};
       if (!resistance.check()) return std::unexpected{ConfigError::kResistance};
       if (!meter.check()) return std::unexpected{ConfigError::kMeter};
-      if (!(leakage_inductance_h >= 0.0F && rated_flux_v_s > 0.0F))
+      if (!(leakage_inductance_h >= 0.0F && rated_flux_v_s > 0.0F &&
+            speed_delay_ticks <= kLongestDelay))
         return std::unexpected{ConfigError::kMotor};
       return {};
     }
   };
+
+  static constexpr std::uint32_t kLongestDelay = 15;  // ticks
 
   struct Sample {
     MotorSample motor;
@@ -77,8 +81,8 @@ class FusedObserver {
 
   struct Output {
     bool valid;                    // an estimate exists
-    bool steady;                   // speed stands still: channel offsets can be measured
     bool calibrated;
+    bool tared;
     AirCut::Phase phase;
     float airgap_power_w;
     float airgap_torque_nm;        // mean of the tick, corrected
@@ -87,6 +91,7 @@ class FusedObserver {
     float net_sigma_nm;
     float speed_rad_s;
     float frequency_rad_s;         // electrical
+    float even_frequency_rad_s;    // its mean since the speed stands still; 0: not for long enough
     float tare_nm;
     float tare_age_s;
     float idle_s;                  // time in this idle
@@ -99,6 +104,8 @@ class FusedObserver {
     float frequency_rad_s = 0.0F;
     float acceleration_rad_s2 = 0.0F;  // of the frequency
     float locked_s = 0.0F;
+    float even_angle_rad = 0.0F;     // that the flux has turned since the speed stands still
+    float even_s = 0.0F;
     float speed_sum_rad_s = 0.0F;
     std::uint32_t speed_count = 0;
     float meter_w = 0.0F;
@@ -108,6 +115,7 @@ class FusedObserver {
     float idle_power_torque_nm = 0.0F;  // P_i p / w_e likewise
     std::uint32_t ticks = 0;         // since the estimate became valid
     std::uint32_t calibrated = 0;
+    std::array<float, 2 * (kLongestDelay + 1)> delayed_nm{};  // torque and its moment, a ring
   };
 
   struct State {
@@ -126,6 +134,9 @@ class FusedObserver {
 
   void step(const Sample& sample) noexcept;
   [[nodiscard]] Output tick(AirCut::Feed feed) noexcept;
+
+  // Samples are missing: what was learned stays, what was integrated begins anew.
+  void restart() noexcept;
 
   // Voltages and currents to come are corrected by these offsets (idle calibration).
   void recalibrated(SpaceVector voltage_offset_v, SpaceVector current_offset_a) noexcept;
@@ -150,6 +161,7 @@ class FusedObserver {
   void track_frequency(const Rotation& rotation, float duration_s) noexcept;
   [[nodiscard]] Speed take_speed(const Rotation& rotation, float torque_nm, bool locked,
                                  float duration_s) noexcept;
+  [[nodiscard]] std::array<float, 2> delayed(float torque_nm, float moment_nm) noexcept;
   [[nodiscard]] float correction_nm(const FluxTorque::Window& window, float copper) const noexcept;
   void learn(const FluxTorque::Window& window, const Rotation& rotation, const Output& out,
              float copper, float speed_rad_s) noexcept;
