@@ -94,7 +94,8 @@ auto AirCut::decide(const Input& input, float y_nm, float slope_nm, float sign) 
     if (!(input.sigma_nm < kTareSigma_ratio * rated)) return Phase::kUnsteady;
     // No cut drives the spindle: less than nominal friction is friction or a wrong parameter.
     const float limit = config_.friction_limit_ratio * rated + input.model_sigma_nm;
-    return y_nm < limit ? Phase::kIdle : Phase::kCut;
+    return y_nm < limit && y_nm > -limit - config_.friction_limit_ratio * rated ? Phase::kIdle
+                                                                              : Phase::kCut;
   }
   return magnitude(net) < kReturn_ratio * rated && state_.was_cut == 0 ? Phase::kIdle : Phase::kCut;
 }

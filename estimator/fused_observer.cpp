@@ -91,8 +91,9 @@ void FusedObserver::recalibrated(SpaceVector voltage_offset_v,
   if (tick_.calibrated != 0) return;  // a refinement: too small to upset what runs
   // What the filter has seen so far carries the ripple of the offsets: begin anew from the means.
   const LoadTorqueFilter::Noise& noise = noise_.noise();
-  filter_.start(noise_.explained_speed_rad_s(),
-                std::sqrt(noise.speed_variance + noise.angle_variance),
+  // A measured speed never carried it; the flux's did.
+  filter_.start(config_.sensorless ? noise_.explained_speed_rad_s() : noise_.last_speed_rad_s(),
+                std::sqrt(noise.speed_variance + 2.0F * noise.angle_variance),
                 noise_.mean_torque_nm(), kUncalibrated_ratio * config_.filter.rated_torque_nm);
   noise_.restart();
   air_.restart_average();
@@ -306,7 +307,8 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .sigma_nm = std::sqrt(load.variance_nm2),
                  .model_sigma_nm = magnitude(resistance_.change_sigma_ohm() * copper),
                  .airgap_torque_nm = torque,
-                 .speed_rad_s = load.speed_rad_s,
+                 // The field's own speed is calmer than what the flux says of the shaft's.
+                 .speed_rad_s = config_.sensorless ? tick_.frequency_rad_s / p : load.speed_rad_s,
                  .speed_sigma_rad_s =
                      std::sqrt(noise.speed_variance + 2.0F * noise.angle_variance),
                  .duration_s = h,

@@ -10,9 +10,12 @@ constexpr std::uint32_t kHistory = 2 * NoiseMeter::kLag;  // ticks until the dif
 constexpr std::uint32_t kBlock = 50;                      // ticks
 constexpr std::uint32_t kMostBlocks = 16;
 constexpr float kLoud_ratio = 2.5F;
+constexpr std::uint32_t kLastingLoud = 5;  // blocks
 constexpr float kQuiet_ratio = 0.4F;
 constexpr float kColour_ratio = 1.5F;
 constexpr float kCoarse_rad_s = 0.3F;        // a finer quantum is the number format's or an ADC's
+constexpr float kWhiteBeat = 0.25F;          // of the tick rate
+constexpr float kSlowestBeat = 0.03F;
 constexpr std::uint32_t kSureQuantised = 60;
 constexpr float kFirstSpeed_rad_s = 0.03F;
 constexpr float kFirstTorque_ratio = 0.02F;
@@ -115,7 +118,9 @@ void NoiseMeter::close_block(bool of_speed) noexcept {
   const Differences d = s.block;
   s.block = {};
   s.filled = 0;
-  const bool first = s.blocks == 0;
+  s.loud = d.e0 * kShare > kLoud_ratio * s.mean.e0 ? s.loud + 1 : 0;
+  const bool first = s.blocks == 0 || s.loud >= kLastingLoud;
+  if (first) s.blocks = s.loud = 0;
   if (s.blocks < kMostBlocks && of_speed) ++s.blocks;
   const float share = 1.0F / static_cast<float>(of_speed ? s.blocks : kMostBlocks);
   const auto blend = [first, share](float& mean, float sum) {
@@ -153,7 +158,12 @@ void NoiseMeter::set_noise(float duration_s) noexcept {
   float floor = kSpeedFloor_rad_s * kSpeedFloor_rad_s;
   if (config_.sensorless) floor += kFluxFloor_rad_s * kFluxFloor_rad_s;
   if (counts()) {
-    angle = s.quantum_rad_s * s.quantum_rad_s * (1.0F / 12.0F);
+    // A sawtooth at the beat of counts and ticks; the slower, the more of it is in the filter's band.
+    const float counts_a_tick = magnitude(s.explained_rad_s) / s.quantum_rad_s;
+    const float beat = magnitude(counts_a_tick - static_cast<float>(static_cast<int>(counts_a_tick + 0.5F)));
+    const float colour = beat < kSlowestBeat ? kWhiteBeat / kSlowestBeat
+                                             : (beat < kWhiteBeat ? kWhiteBeat / beat : 1.0F);
+    angle = colour * s.quantum_rad_s * s.quantum_rad_s * (1.0F / 12.0F);
     white = 0.0F;
   } else {
     const float known = white + 2.0F * angle;

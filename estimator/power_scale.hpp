@@ -81,7 +81,7 @@ class PowerScale {
 
  private:
   static constexpr float kSmallestPower_ratio = 0.2F;
-  static constexpr float kLagError_ratio = 0.3F;
+  static constexpr float kLagError_ratio = 0.1F;
   static constexpr float kCorrelation_s = 0.1F;  // readings within it are one
 
   explicit constexpr PowerScale(const Config& config) noexcept : config_(config) {}
