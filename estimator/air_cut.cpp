@@ -6,7 +6,7 @@ namespace cutforce::estimator {
 namespace {
 
 constexpr float kSlopeTime_s = 0.05F;
-constexpr float kUnsteady_ratio = 0.03F;   // of the rated torque, as acceleration torque
+constexpr float kUnsteady_ratio = 0.03F;  // of the rated torque, as acceleration torque
 constexpr float kTareTime_s = 0.3F;
 constexpr float kSnapshot_s = 0.025F;
 constexpr float kShortestWait_s = 0.06F;
@@ -19,7 +19,7 @@ constexpr float kYoungTare_s = 0.06F;
 constexpr float kLargestThreshold_ratio = 0.06F;
 constexpr float kAging_ratio_sqrt_s = 5e-4F;  // friction drifts between tare and cut
 constexpr float kUnknownFriction_ratio = 0.05F;
-constexpr float kReturn_ratio = 0.05F;     // believed as idle after a change of speed
+constexpr float kReturn_ratio = 0.05F;  // believed as idle after a change of speed
 
 float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
 
@@ -35,7 +35,8 @@ void AirCut::tare(float y_nm, float variance_nm2, float duration_s) noexcept {
   const float time_s = state_.idle_s < kTareTime_s ? state_.idle_s : kTareTime_s;
   const float share = duration_s / (time_s > duration_s ? time_s : duration_s);
   const float deviation = y_nm - state_.tare_nm;
-  if (state_.has_tare == 0 || state_.idle_s <= duration_s) state_.variance_nm2 = deviation * deviation;
+  if (state_.has_tare == 0 || state_.idle_s <= duration_s)
+    state_.variance_nm2 = deviation * deviation;
   const float floor_nm = kTorqueFloor_ratio * config_.rated_torque_nm;
   const float weight = 1.0F / (variance_nm2 + floor_nm * floor_nm);
   state_.tare_weight = (1.0F - duration_s / kTareTime_s) * state_.tare_weight + weight;
@@ -93,9 +94,9 @@ auto AirCut::decide(const Input& input, float y_nm, float slope_nm, float sign) 
     // Not before the load torque is known well enough to be a tare.
     if (!(input.sigma_nm < kTareSigma_ratio * rated)) return Phase::kUnsteady;
     // No cut drives the spindle: less than nominal friction is friction or a wrong parameter.
-    const float limit = config_.friction_limit_ratio * rated + input.model_sigma_nm;
-    return y_nm < limit && y_nm > -limit - config_.friction_limit_ratio * rated ? Phase::kIdle
-                                                                              : Phase::kCut;
+    const float believed = config_.friction_limit_ratio * rated;
+    const float most = believed + input.model_sigma_nm;
+    return y_nm < most && y_nm > -most - believed ? Phase::kIdle : Phase::kCut;
   }
   return magnitude(net) < kReturn_ratio * rated && state_.was_cut == 0 ? Phase::kIdle : Phase::kCut;
 }

@@ -45,26 +45,26 @@ class AirCut {
 
   struct Input {
     float load_torque_nm;
-    float sigma_nm;         // of the load torque
-    float model_sigma_nm;    // of the torque before any tare: resistance
+    float sigma_nm;        // of the load torque
+    float model_sigma_nm;  // of the torque before any tare: resistance
     float airgap_torque_nm;
     float speed_rad_s;
     float speed_sigma_rad_s;
     float duration_s;
     Feed feed;
-    bool calibrated;        // false: the torque still carries the ripple of the channel offsets
-    bool valid;             // false: no torque can be told
+    bool calibrated;  // false: the torque still carries the ripple of the channel offsets
+    bool valid;       // false: no torque can be told
   };
 
   struct Output {
     Phase phase;
-    bool steady;            // speed steady for the waiting time
-    float net_torque_nm;    // (y - b) sgn(w)
-    float tare_nm;          // b, in the direction of rotation
+    bool steady;          // speed steady for the waiting time
+    float net_torque_nm;  // (y - b) sgn(w)
+    float tare_nm;        // b, in the direction of rotation
     float tare_sigma_nm;
     float idle_variance_nm2;
-    float idle_s;           // time in this idle, 0 outside
-    float tare_age_s;       // time since the tare was last adjusted
+    float idle_s;      // time in this idle, 0 outside
+    float tare_age_s;  // time since the tare was last adjusted
     bool has_tare;
   };
 
@@ -73,8 +73,8 @@ class AirCut {
     std::uint32_t has_tare = 0;
     float slow_speed_rad_s = 0.0F;
     float slower_speed_rad_s = 0.0F;
-    float steady_s = 0.0F;         // speed steady, and torque near air
-    float even_s = 0.0F;           // speed steady
+    float steady_s = 0.0F;  // speed steady, and torque near air
+    float even_s = 0.0F;    // speed steady
     float idle_s = 0.0F;
     float tare_weight = 0.0F;
     float tare_nm = 0.0F;

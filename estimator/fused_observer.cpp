@@ -11,10 +11,10 @@ constexpr float kTwoPi = 6.28318530718F;
 constexpr float kFrequencyTime_s = 0.015F;
 constexpr float kLowestFrequency_rad_s = kTwoPi * 3.0F;
 constexpr float kLock_s = 0.03F;
-constexpr float kInertiaWait_s = 0.1F;       // after the lock: the flux has settled
+constexpr float kInertiaWait_s = 0.1F;  // after the lock: the flux has settled
 constexpr float kEvenTurns = 1.5F;
 constexpr float kUncalibrated_ratio = 0.03F;
-constexpr float kTareFollow_ratio = 0.02F;   // of what the tare belongs to, each tick
+constexpr float kTareFollow_ratio = 0.02F;  // of what the tare belongs to, each tick
 
 float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
 
@@ -119,10 +119,9 @@ auto FusedObserver::rotation(const FluxTorque::Window& window) noexcept -> Rotat
   const float l = config_.leakage_inductance_h;
   const SpaceVector i = window.current_a;
   const SpaceVector rotor{window.flux_v_s.alpha - l * i.alpha, window.flux_v_s.beta - l * i.beta};
-  const Rotation result{
-      .flux_rad_s = rotated(rotor, tick_.rotor_flux_v_s) / window.duration_s,
-      .current_rad_s = rotated(i, tick_.current_a) / window.duration_s,
-      .flux_squared = dot(rotor, rotor)};  // (E100)
+  const Rotation result{.flux_rad_s = rotated(rotor, tick_.rotor_flux_v_s) / window.duration_s,
+                        .current_rad_s = rotated(i, tick_.current_a) / window.duration_s,
+                        .flux_squared = dot(rotor, rotor)};  // (E100)
   tick_.rotor_flux_v_s = rotor;
   tick_.current_a = i;
   return result;
@@ -196,8 +195,12 @@ auto FusedObserver::unlocked(float speed_rad_s, AirCut::Feed feed, Output out) n
                                .feed = feed,
                                .calibrated = tick_.calibrated != 0,
                                .valid = false}));
-  inertia_.step({.torque_nm = 0.0F, .speed_rad_s = 0.0F, .duration_s = out.duration_s,
-                 .valid = false, .tared = false, .tare_nm = 0.0F});
+  inertia_.step({.torque_nm = 0.0F,
+                 .speed_rad_s = 0.0F,
+                 .duration_s = out.duration_s,
+                 .valid = false,
+                 .tared = false,
+                 .tare_nm = 0.0F});
   out.valid = false;
   out.phase = AirCut::Phase::kUnsteady;
   out.speed_rad_s = speed_rad_s;
@@ -212,8 +215,8 @@ float FusedObserver::sigma_nm(const LoadTorqueFilter::Output& load, const AirCut
   const float inertia = inertia_.sigma_ratio() * (torque_nm - load.load_torque_nm);
   const float resistance = resistance_.change_sigma_ohm() * (copper - tick_.idle_copper);
   const float moved = 0.7F * change_nm;
-  const float noise = load.variance_nm2 > air.idle_variance_nm2 ? load.variance_nm2
-                                                                : air.idle_variance_nm2;
+  const float noise =
+      load.variance_nm2 > air.idle_variance_nm2 ? load.variance_nm2 : air.idle_variance_nm2;
   return std::sqrt(noise + model * model + scale * scale + inertia * inertia +
                    resistance * resistance + moved * moved +
                    air.tare_sigma_nm * air.tare_sigma_nm);  // (E104)
@@ -281,19 +284,19 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
   const float torque = window.torque_nm + correction_nm(window, copper);
   LoadTorqueFilter::Noise noise = noise_.noise();
   const bool by_angle = noise_.counts() || config_.sensorless;
-  noise.centre_ratio = by_angle ? 0.5F : 0.5F - 0.5F / (speed.samples > 1.0F ? speed.samples : 1.0F);
+  noise.centre_ratio =
+      by_angle ? 0.5F : 0.5F - 0.5F / (speed.samples > 1.0F ? speed.samples : 1.0F);
   if (config_.sensorless) noise.torque_variance *= 4.0F;
   const float moment =
       by_angle ? window.moment_nm + 0.5F * window.torque_nm * config_.flux.sample_period_s / h
                : window.moment_nm;
   const auto [waited_nm, waited_moment_nm] = delayed(torque, moment);
-  const LoadTorqueFilter::Input input{
-      .torque_nm = waited_nm,
-      .moment_nm = waited_moment_nm,
-      .speed_rad_s = speed.mean_rad_s,
-      .duration_s = h,
-      .inertia_kg_m2 = inertia_.inertia_kg_m2(),
-      .speed_valid = speed.valid};
+  const LoadTorqueFilter::Input input{.torque_nm = waited_nm,
+                                      .moment_nm = waited_moment_nm,
+                                      .speed_rad_s = speed.mean_rad_s,
+                                      .duration_s = h,
+                                      .inertia_kg_m2 = inertia_.inertia_kg_m2(),
+                                      .speed_valid = speed.valid};
   if (tick_.ticks == 0) {
     filter_.start(speed.mean_rad_s, 1.0F, torque, config_.filter.rated_torque_nm);
   }
@@ -309,8 +312,7 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .airgap_torque_nm = torque,
                  // The field's own speed is calmer than what the flux says of the shaft's.
                  .speed_rad_s = config_.sensorless ? tick_.frequency_rad_s / p : load.speed_rad_s,
-                 .speed_sigma_rad_s =
-                     std::sqrt(noise.speed_variance + 2.0F * noise.angle_variance),
+                 .speed_sigma_rad_s = std::sqrt(noise.speed_variance + 2.0F * noise.angle_variance),
                  .duration_s = h,
                  .feed = feed,
                  .calibrated = tick_.calibrated != 0,

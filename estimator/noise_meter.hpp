@@ -11,7 +11,8 @@
 // from the beat of counts and ticks.
 // Averages are of blocks of 50 ticks; a block much quieter than the mean replaces it (the mean
 // held a transient), a much louder one counts as a little louder only, unless it goes on.
-// Source: ESTIMATOR prototype 1.3, tuning; the split of white, bounded and slow noise: EQUATIONS.md.
+// Source: ESTIMATOR prototype 1.3, tuning; the split of white, bounded and slow noise:
+// EQUATIONS.md.
 #pragma once
 
 #include <array>
@@ -64,12 +65,12 @@ class NoiseMeter {
     Differences block{};
     Differences mean{};
     float quantum_rad_s = 0.0F;
-    std::uint32_t quantised = 0;      // changes that were multiples of it
-    std::uint32_t filled = 0;         // ticks in the block
-    std::uint32_t blocks = 0;         // in the mean
-    std::uint32_t loud = 0;           // loud blocks in a row
-    std::uint32_t ticks = 0;          // since the rest began anew
-    std::uint32_t idle = 0;           // the last tick was idle
+    std::uint32_t quantised = 0;  // changes that were multiples of it
+    std::uint32_t filled = 0;     // ticks in the block
+    std::uint32_t blocks = 0;     // in the mean
+    std::uint32_t loud = 0;       // loud blocks in a row
+    std::uint32_t ticks = 0;      // since the rest began anew
+    std::uint32_t idle = 0;       // the last tick was idle
     std::uint32_t idle_measured = 0;
   };
 

@@ -6,12 +6,13 @@ namespace cutforce::estimator {
 namespace {
 
 constexpr float kBlock_s = 0.05F;
-constexpr float kModelError_ratio = 0.006F;  // of flux, slip and torque together; does not average out
-constexpr float kModelCount = 20.0F;         // blocks that share that error
-constexpr float kSlipNoise_rad_s = 0.02F;    // of a block's mean
-constexpr float kSteady_ratio = 0.02F;       // torque may move by this much of rated within a block
+constexpr float kModelError_ratio =
+    0.006F;                           // of flux, slip and torque together; does not average out
+constexpr float kModelCount = 20.0F;  // blocks that share that error
+constexpr float kSlipNoise_rad_s = 0.02F;  // of a block's mean
+constexpr float kSteady_ratio = 0.02F;     // torque may move by this much of rated within a block
 constexpr float kScatterShare = 0.2F;
-constexpr float kScatterCount = 4.0F;        // slow noise: blocks are not independent
+constexpr float kScatterCount = 4.0F;  // slow noise: blocks are not independent
 constexpr float kStandsOut_sigmas = 3.0F;
 constexpr float kLargestRise_ratio = 1.0F;  // of the resistance in use
 constexpr float kLargestFall_ratio = 0.5F;
@@ -44,7 +45,8 @@ void StatorResistance::step(const Input& in) noexcept {
     if (!in.steady) return;
   }
   const float w = in.frequency_rad_s;
-  const float x = 1.5F * in.current_squared_a2 * config_.pole_pairs / (w > 1.0F || w < -1.0F ? w : 1.0F);
+  const float x =
+      1.5F * in.current_squared_a2 * config_.pole_pairs / (w > 1.0F || w < -1.0F ? w : 1.0F);
   s[0] += in.flux_squared * in.duration_s;
   s[1] += (in.flux_frequency_rad_s - config_.pole_pairs * in.speed_rad_s) * in.duration_s;
   s[2] += in.torque_nm * in.duration_s;
@@ -83,7 +85,8 @@ void StatorResistance::learn() noexcept {
   const float change = r - state_.last_rest;
   state_.last_rest = r;
   state_.scatter += kScatterShare * (0.5F * change * change - state_.scatter);
-  const float noise = slip_noise * slip_noise + kScatterCount * state_.scatter + kModelCount * model * model;
+  const float noise =
+      slip_noise * slip_noise + kScatterCount * state_.scatter + kModelCount * model * model;
 
   auto& [p00, p01, p02, p11, p12, p22] = state_.covariance;
   const float g0 = p00 * h[0] + p01 * h[1] + p02 * h[2];
