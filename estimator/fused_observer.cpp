@@ -157,6 +157,7 @@ auto FusedObserver::take_speed(const Rotation& r, float torque_nm, bool locked,
                                float duration_s) noexcept -> Speed {
   const auto samples = static_cast<float>(tick_.speed_count);
   Speed speed{.mean_rad_s = samples > 0.0F ? tick_.speed_sum_rad_s / samples : 0.0F,
+              .slip_rad_s = 0.0F,
               .samples = samples,
               .valid = samples > 0.0F};
   tick_.speed_sum_rad_s = 0.0F;
@@ -170,6 +171,7 @@ auto FusedObserver::take_speed(const Rotation& r, float torque_nm, bool locked,
   const float slip = speed.valid ? 2.0F * config_.resistance.rotor_resistance_ohm * torque_nm /
                                        (3.0F * p * r.flux_squared)
                                  : 0.0F;
+  speed.slip_rad_s = slip;
   speed.mean_rad_s = (r.flux_rad_s - slip) / p;  // (E102)
   return speed;
 }
@@ -311,7 +313,8 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .model_sigma_nm = magnitude(resistance_.change_sigma_ohm() * copper),
                  .airgap_torque_nm = torque,
                  // The field's own speed is calmer than what the flux says of the shaft's.
-                 .speed_rad_s = config_.sensorless ? tick_.frequency_rad_s / p : load.speed_rad_s,
+                 .speed_rad_s = config_.sensorless ? (tick_.frequency_rad_s - speed.slip_rad_s) / p
+                                                    : load.speed_rad_s,
                  .speed_sigma_rad_s = std::sqrt(noise.speed_variance + 2.0F * noise.angle_variance),
                  .duration_s = h,
                  .feed = feed,

@@ -161,6 +161,7 @@ class FusedObserver {
   };
   struct Speed {
     float mean_rad_s;
+    float slip_rad_s;  // electrical; sensorless only
     float samples;
     bool valid;
   };

@@ -77,11 +77,18 @@ class PowerScale {
     if (state_.variance < least) state_.variance = least;
   }
 
-  [[nodiscard]] constexpr float gain_ratio() const noexcept { return state_.gain; }
+  // Without what the meter's own uncertainty explains: a check, not a second source.
+  [[nodiscard]] constexpr float gain_ratio() const noexcept {
+    const float off = state_.gain - 1.0F;
+    const float excused = kExcused_sigmas * config_.meter_sigma_ratio;
+    if (off > excused) return 1.0F + (off - excused);
+    return off < -excused ? 1.0F + (off + excused) : 1.0F;
+  }
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
   constexpr void restore(const State& state) noexcept { state_ = state; }
 
  private:
+  static constexpr float kExcused_sigmas = 0.4F;
   static constexpr float kSmallestPower_ratio = 0.2F;
   static constexpr float kLagError_ratio = 0.1F;
   static constexpr float kCorrelation_s = 0.1F;  // readings within it are one
