@@ -18,8 +18,11 @@ constexpr float kTareFollow_ratio = 0.02F;  // of what the tare belongs to, each
 
 float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
 
-float rotated(SpaceVector now, SpaceVector before) noexcept {
-  return angle_of(dot(now, before), cross(now, before));
+// Turned angle; of the angles that look the same, the one nearest to what is expected.
+float rotated(SpaceVector now, SpaceVector before, float expected_rad) noexcept {
+  const float angle = angle_of(dot(now, before), cross(now, before));
+  const float turns = (expected_rad - angle) / kTwoPi;
+  return angle + kTwoPi * static_cast<float>(static_cast<int>(turns + (turns < 0.0F ? -0.5F : 0.5F)));
 }
 
 }  // namespace
@@ -119,8 +122,10 @@ auto FusedObserver::rotation(const FluxTorque::Window& window) noexcept -> Rotat
   const float l = config_.leakage_inductance_h;
   const SpaceVector i = window.current_a;
   const SpaceVector rotor{window.flux_v_s.alpha - l * i.alpha, window.flux_v_s.beta - l * i.beta};
-  const Rotation result{.flux_rad_s = rotated(rotor, tick_.rotor_flux_v_s) / window.duration_s,
-                        .current_rad_s = rotated(i, tick_.current_a) / window.duration_s,
+  const float expected = tick_.frequency_rad_s * window.duration_s;
+  const Rotation result{
+      .flux_rad_s = rotated(rotor, tick_.rotor_flux_v_s, expected) / window.duration_s,
+      .current_rad_s = rotated(i, tick_.current_a, expected) / window.duration_s,
                         .flux_squared = dot(rotor, rotor)};  // (E100)
   tick_.rotor_flux_v_s = rotor;
   tick_.current_a = i;
@@ -163,7 +168,9 @@ auto FusedObserver::take_speed(const Rotation& r, float torque_nm, bool locked,
   tick_.speed_sum_rad_s = 0.0F;
   tick_.speed_count = 0;
   if (!config_.sensorless) {
-    if (speed.valid) speed.mean_rad_s -= ripple_.step(speed.mean_rad_s, duration_s);
+    if (!speed.valid) return speed;
+    tick_.ripple_rad_s = ripple_.step(speed.mean_rad_s, duration_s);
+    speed.mean_rad_s -= tick_.ripple_rad_s;
     return speed;
   }
   const float p = config_.flux.pole_pairs;
@@ -329,6 +336,11 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .inertia_kg_m2 = input.inertia_kg_m2,
                  .idle = idle,
                  .calibrated = tick_.calibrated != 0});
+  }
+  // Before the first tare a ripple may be what keeps the torque from being known well enough.
+  const bool even = air.steady && tick_.calibrated != 0 && !air.has_tare;
+  if ((idle || even) && speed.valid && !config_.sensorless) {
+    ripple_.learn(noise_.rest_rad_s() + tick_.ripple_rad_s, h);
   }
   inertia_.step({.torque_nm = window.torque_nm,
                  .speed_rad_s = load.speed_rad_s,

@@ -116,6 +116,7 @@ class FusedObserver {
     std::uint32_t speed_count = 0;
     float meter_w = 0.0F;
     std::uint32_t meter_count = 0;
+    float ripple_rad_s = 0.0F;       // taken off the speed of this tick
     float load_torque_nm = 0.0F;
     float idle_copper = 0.0F;           // x of (E110) when the tare was taken
     float idle_power_torque_nm = 0.0F;  // P_i p / w_e likewise
