@@ -13,6 +13,7 @@ constexpr float kLowestFrequency_rad_s = kTwoPi * 3.0F;
 constexpr float kLock_s = 0.03F;
 constexpr float kInertiaWait_s = 0.1F;  // after the lock: the flux has settled
 constexpr float kRippleWait_s = 0.2F;       // until a transient has gone from the rest
+constexpr float kRippleSpeed_rad_s = 60.0F;  // slower, a turn is no quicker than a drift
 constexpr float kEvenTurns = 1.5F;
 constexpr float kUncalibrated_ratio = 0.03F;
 constexpr float kTareFollow_ratio = 0.02F;  // of what the tare belongs to, each tick
@@ -340,7 +341,8 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
   }
   // Before the first tare a ripple may be what keeps the torque from being known well enough.
   const bool even = air.steady && tick_.calibrated != 0 && !air.has_tare;
-  if ((idle || even) && tick_.even_s > kRippleWait_s && speed.valid && !config_.sensorless) {
+  if ((idle || even) && tick_.even_s > kRippleWait_s && speed.valid &&
+      magnitude(speed.mean_rad_s) > kRippleSpeed_rad_s && !config_.sensorless) {
     ripple_.learn(noise_.rest_rad_s() + tick_.ripple_rad_s, h);
   }
   inertia_.step({.torque_nm = window.torque_nm,
