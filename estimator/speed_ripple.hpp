@@ -2,8 +2,8 @@
 //
 //   theta += w_m h;   e = a_1 cos theta + b_1 sin theta + a_2 cos 2 theta + b_2 sin 2 theta (E105)
 // Learned from the unexplained rest of the speed while idle (stochastic gradient, 0.5 s), taken off
-// the measured speed always. Applied only where it explains a good part of the rest: a transient or noise does not.
-// Source: ESTIMATOR prototype 1.3, "once-per-revolution speed error".
+// the measured speed always. Applied only where it explains a good part of the rest: a transient or
+// noise does not. Source: ESTIMATOR prototype 1.3, "once-per-revolution speed error".
 #pragma once
 
 #include <array>
@@ -60,8 +60,7 @@ class SpeedRipple {
   [[nodiscard]] constexpr bool applies() const noexcept {
     float power = 0.0F;
     for (const float a : state_.amplitude_rad_s) power += a * a;
-    return state_.learned_s > kTime_s &&
-           power > kStandsOut_ratio * state_.rest_variance;
+    return state_.learned_s > kTime_s && power > kStandsOut_ratio * state_.rest_variance;
   }
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
