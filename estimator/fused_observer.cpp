@@ -268,6 +268,7 @@ void FusedObserver::learn(const FluxTorque::Window& window, const Rotation& r, c
                     .frequency_rad_s = tick_.frequency_rad_s,
                     .torque_nm = window.torque_nm,
                     .current_squared_a2 = window.current_squared_a2,
+                    .idle_copper_nm_ohm = tick_.idle_copper,
                     .duration_s = out.duration_s,
                     .steady = tick_.even_s > 0.0F && tick_.calibrated != 0});
 }
