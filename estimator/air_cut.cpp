@@ -6,7 +6,7 @@ namespace cutforce::estimator {
 namespace {
 
 constexpr float kSlopeTime_s = 0.05F;
-constexpr float kUnsteady_ratio = 0.03F;   // of the rated torque, as acceleration torque
+constexpr float kUnsteady_ratio = 0.03F;  // of the rated torque, as acceleration torque
 constexpr float kTareTime_s = 0.3F;
 constexpr float kSnapshot_s = 0.025F;
 constexpr float kShortestWait_s = 0.06F;
@@ -15,9 +15,14 @@ constexpr float kNoiseWait_s = 0.15F;
 constexpr float kNoisySpeed_rad_s = 0.2F;
 constexpr float kTorqueFloor_ratio = 1e-3F;
 constexpr float kTareSigma_ratio = 0.02F;
+constexpr float kSettled_s = 0.5F;
+constexpr float kDrift_ratio_s = 0.004F;
+constexpr float kLongestWait_s = 1.2F;
 constexpr float kYoungTare_s = 0.06F;
 constexpr float kLargestThreshold_ratio = 0.06F;
-constexpr float kReturn_ratio = 0.05F;     // believed as idle after a change of speed
+constexpr float kAging_ratio_sqrt_s = 5e-4F;  // friction drifts between tare and cut
+constexpr float kUnknownFriction_ratio = 0.05F;
+constexpr float kReturn_ratio = 0.05F;  // believed as idle after a change of speed
 
 float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
 
@@ -33,11 +38,18 @@ void AirCut::tare(float y_nm, float variance_nm2, float duration_s) noexcept {
   const float time_s = state_.idle_s < kTareTime_s ? state_.idle_s : kTareTime_s;
   const float share = duration_s / (time_s > duration_s ? time_s : duration_s);
   const float deviation = y_nm - state_.tare_nm;
-  if (state_.has_tare == 0 || state_.idle_s <= duration_s) state_.variance_nm2 = deviation * deviation;
+  if (state_.has_tare == 0 || state_.idle_s <= duration_s)
+    state_.variance_nm2 = deviation * deviation;
   const float floor_nm = kTorqueFloor_ratio * config_.rated_torque_nm;
   const float weight = 1.0F / (variance_nm2 + floor_nm * floor_nm);
   state_.tare_weight = (1.0F - duration_s / kTareTime_s) * state_.tare_weight + weight;
-  state_.tare_nm += deviation * weight / state_.tare_weight;  // (E91)
+  float moved = deviation * weight / state_.tare_weight;  // (E91)
+  if (state_.idle_s > kSettled_s) {
+    // Friction drifts slowly; what is faster is a cut that begins gently.
+    const float most = kDrift_ratio_s * config_.rated_torque_nm * duration_s;
+    moved = moved > most ? most : (moved < -most ? -most : moved);
+  }
+  state_.tare_nm += moved;
   state_.variance_nm2 += share * (deviation * deviation - state_.variance_nm2);
   state_.has_tare = 1;
   state_.tare_age_s = 0.0F;
@@ -51,7 +63,8 @@ void AirCut::tare(float y_nm, float variance_nm2, float duration_s) noexcept {
   }
 }
 
-auto AirCut::decide(const Input& input, float y_nm, float slope_nm) const noexcept -> Phase {
+auto AirCut::decide(const Input& input, float y_nm, float slope_nm, float sign) const noexcept
+    -> Phase {
   const float rated = config_.rated_torque_nm;
   float threshold = config_.contact_ratio * rated;
   const float noise = 4.0F * input.sigma_nm;
@@ -74,9 +87,8 @@ auto AirCut::decide(const Input& input, float y_nm, float slope_nm) const noexce
     case Phase::kIdle: {
       if (magnitude(net) <= threshold) return Phase::kIdle;
       if (state_.idle_s < kYoungTare_s) return Phase::kUnsteady;
-      const float friction = y_nm - net;  // b, about the torque of the air cut
       const bool speeding_up = slope_nm > kUnsteady_ratio * rated;
-      const bool braking = input.airgap_torque_nm < friction - threshold;
+      const bool braking = input.airgap_torque_nm * sign < state_.tare_nm - threshold;
       return net > 0.0F && !speeding_up && !braking ? Phase::kCut : Phase::kUnsteady;
     }
     case Phase::kCut: {
@@ -89,8 +101,13 @@ auto AirCut::decide(const Input& input, float y_nm, float slope_nm) const noexce
   if (!waited) return Phase::kUnsteady;
   if (state_.has_tare == 0) {
     // Not before the load torque is known well enough to be a tare.
-    if (!(input.sigma_nm < kTareSigma_ratio * rated)) return Phase::kUnsteady;
-    return magnitude(y_nm) < config_.friction_limit_ratio * rated ? Phase::kIdle : Phase::kCut;
+    if (!(input.sigma_nm < kTareSigma_ratio * rated) && state_.even_s < kLongestWait_s) {
+      return Phase::kUnsteady;
+    }
+    // No cut drives the spindle: less than nominal friction is friction or a wrong parameter.
+    const float believed = config_.friction_limit_ratio * rated;
+    const float most = believed + input.model_sigma_nm;
+    return y_nm < most && y_nm > -most - believed ? Phase::kIdle : Phase::kCut;
   }
   return magnitude(net) < kReturn_ratio * rated && state_.was_cut == 0 ? Phase::kIdle : Phase::kCut;
 }
@@ -106,8 +123,8 @@ auto AirCut::step(const Input& input) noexcept -> Output {
     state_.slower_speed_rad_s = input.speed_rad_s;
   }
   const float sign = input.speed_rad_s > 0.0F ? 1.0F : (input.speed_rad_s < 0.0F ? -1.0F : 0.0F);
-  const float y = input.load_torque_nm - config_.coulomb_torque_nm * sign -
-                  config_.viscous_nm_s_rad * input.speed_rad_s;  // (E90)
+  const float y = (input.load_torque_nm - config_.viscous_nm_s_rad * input.speed_rad_s) * sign -
+                  config_.coulomb_torque_nm;  // (E90)
   const float share = h < kSlopeTime_s ? h / kSlopeTime_s : 1.0F;
   const float lag = input.speed_rad_s - state_.slow_speed_rad_s;
   const float slope_nm = config_.inertia_kg_m2 * lag / kSlopeTime_s * sign;
@@ -125,13 +142,14 @@ auto AirCut::step(const Input& input) noexcept -> Output {
     state_.even_s = steady ? state_.even_s + h : 0.0F;
     state_.steady_s = steady && in_band ? state_.steady_s + h : 0.0F;
     const Phase before = state_.phase;
-    const Phase now = decide(input, y, slope_nm);
+    const Phase now = decide(input, y, slope_nm, sign);
     if (before == Phase::kIdle && now != Phase::kIdle) {
       if (state_.has_tare != 0) state_.tare_nm = state_.snapshots_nm[3];
       if (state_.idle_s < kYoungTare_s && now == Phase::kUnsteady) state_.has_tare = 0;
       state_.idle_s = 0.0F;
     }
     if (now == Phase::kCut) state_.was_cut = 1;
+    if (now == Phase::kCut && before != Phase::kCut) state_.steady_s = 0.0F;
     if (now == Phase::kIdle) {
       state_.was_cut = 0;
       if (before != Phase::kIdle && state_.has_tare != 0 && input.feed == Feed::kUnknown) {
@@ -149,14 +167,20 @@ auto AirCut::step(const Input& input) noexcept -> Output {
 
   const float averaged_s = state_.idle_s > h ? state_.idle_s : h;
   const float samples = (averaged_s < kTareTime_s ? averaged_s : kTareTime_s) / h;
+  const float aged_nm = kAging_ratio_sqrt_s * config_.rated_torque_nm;
+  const float unknown_nm = kUnknownFriction_ratio * config_.rated_torque_nm;
+  const float tare_variance_nm2 =
+      state_.has_tare != 0 ? state_.variance_nm2 / samples + aged_nm * aged_nm * state_.tare_age_s
+                           : unknown_nm * unknown_nm;
   return {.phase = state_.phase,
           .steady = state_.even_s > kEven_s,
-          .net_torque_nm = y - state_.tare_nm,
+          .net_torque_nm = (y - state_.tare_nm) * sign,
           .tare_nm = state_.tare_nm,
-          .tare_sigma_nm = std::sqrt(state_.variance_nm2 / samples),
+          .tare_sigma_nm = std::sqrt(tare_variance_nm2),
           .idle_variance_nm2 = state_.variance_nm2,
           .idle_s = state_.phase == Phase::kIdle ? state_.idle_s : 0.0F,
-          .tare_age_s = state_.tare_age_s};
+          .tare_age_s = state_.tare_age_s,
+          .has_tare = state_.has_tare != 0};
 }
 
 }  // namespace cutforce::estimator

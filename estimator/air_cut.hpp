@@ -1,6 +1,6 @@
 // Tells air from cut, and keeps the no-load torque of the air cut just before contact (tare).
 //
-//   y    = tau - T_C sgn(w) - B w                    load torque less nominal friction    (E90)
+//   y    = (tau - T_C sgn(w) - B w) sgn(w)           load torque less nominal friction    (E90)
 //   b   += (y - b) / (P W),  W = (1 - h/0.3 s) W + 1/P   while idle, frozen in the cut     (E91)
 //   contact:  y - b > max(4 sigma, 1.5 % T_n)        and the motor is not braking          (E92)
 // On contact the tare returns to its value of about 0.1 s before, so that the start of a slow
@@ -45,25 +45,27 @@ class AirCut {
 
   struct Input {
     float load_torque_nm;
-    float sigma_nm;         // of the load torque
+    float sigma_nm;        // of the load torque
+    float model_sigma_nm;  // of the torque before any tare: resistance
     float airgap_torque_nm;
     float speed_rad_s;
     float speed_sigma_rad_s;
     float duration_s;
     Feed feed;
-    bool calibrated;        // false: the torque still carries the ripple of the channel offsets
-    bool valid;             // false: no torque can be told
+    bool calibrated;  // false: the torque still carries the ripple of the channel offsets
+    bool valid;       // false: no torque can be told
   };
 
   struct Output {
     Phase phase;
-    bool steady;            // speed steady for the waiting time
-    float net_torque_nm;    // y - b
-    float tare_nm;          // b
+    bool steady;          // speed steady for the waiting time
+    float net_torque_nm;  // (y - b) sgn(w)
+    float tare_nm;        // b, in the direction of rotation
     float tare_sigma_nm;
     float idle_variance_nm2;
-    float idle_s;           // time in this idle, 0 outside
-    float tare_age_s;       // time since the tare was last adjusted
+    float idle_s;      // time in this idle, 0 outside
+    float tare_age_s;  // time since the tare was last adjusted
+    bool has_tare;
   };
 
   struct State {
@@ -71,8 +73,8 @@ class AirCut {
     std::uint32_t has_tare = 0;
     float slow_speed_rad_s = 0.0F;
     float slower_speed_rad_s = 0.0F;
-    float steady_s = 0.0F;         // speed steady, and torque near air
-    float even_s = 0.0F;           // speed steady
+    float steady_s = 0.0F;  // speed steady, and torque near air
+    float even_s = 0.0F;    // speed steady
     float idle_s = 0.0F;
     float tare_weight = 0.0F;
     float tare_nm = 0.0F;
@@ -99,7 +101,8 @@ class AirCut {
  private:
   explicit AirCut(const Config& config) noexcept : config_(config) {}
   void tare(float y_nm, float variance_nm2, float duration_s) noexcept;
-  [[nodiscard]] Phase decide(const Input& input, float y_nm, float slope_nm) const noexcept;
+  [[nodiscard]] Phase decide(const Input& input, float y_nm, float slope_nm,
+                             float sign) const noexcept;
 
   Config config_;
   State state_{};

@@ -8,8 +8,8 @@ namespace {
 // Beyond this angle of rotation between two samples the sinusoid is not resolved; the integral
 // starts anew from the steady state.
 constexpr float kLargestHalfAngle_rad = 1.0F;
-constexpr float kSmallestFrequency_rad_s = 6.0F;   // below it the phase of the leak is not corrected
-constexpr float kSlowestLeak_rad_s = 10.0F;         // the leak never acts slower than at this w_e
+constexpr float kSmallestFrequency_rad_s = 6.0F;  // below it the phase of the leak is not corrected
+constexpr float kSlowestLeak_rad_s = 10.0F;       // the leak never acts slower than at this w_e
 
 constexpr SpaceVector times(SpaceVector a, SpaceVector b) noexcept {
   return {a.alpha * b.alpha - a.beta * b.beta, a.alpha * b.beta + a.beta * b.alpha};
@@ -32,7 +32,8 @@ auto FluxTorque::coefficients(float frequency_rad_s, float period_s) const noexc
   const float a = leaked < 0.5F ? 1.0F - leaked : 0.5F;
   const float half_angle = 0.5F * frequency_rad_s * period_s;
   const float t_over_w = 0.5F * period_s * tan_over_x(half_angle);  // t / w_e
-  const float leak_over_w = magnitude > kSmallestFrequency_rad_s ? (1.0F - a) / frequency_rad_s : 0.0F;
+  const float leak_over_w =
+      magnitude > kSmallestFrequency_rad_s ? (1.0F - a) / frequency_rad_s : 0.0F;
   return {.leak = a, .gain_s = {0.5F * t_over_w * (1.0F + a), -0.5F * leak_over_w}};  // (E64)
 }
 

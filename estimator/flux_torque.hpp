@@ -51,8 +51,8 @@ class FluxTorque {
     float power_w;             // electrical input power 1.5 Re(v conj i)
     float current_squared_a2;  // |i|^2
     float duration_s;
-    SpaceVector flux_v_s;      // at the end of the window
-    SpaceVector current_a;     // at the end of the window
+    SpaceVector flux_v_s;   // at the end of the window
+    SpaceVector current_a;  // at the end of the window
   };
 
   struct State {
@@ -60,15 +60,15 @@ class FluxTorque {
     SpaceVector emf_v{};
     SpaceVector current_a{};
     float torque_nm = 0.0F;
-    float leak = 1.0F;               // a
-    SpaceVector gain_s{};            // c
-    float frequency_rad_s = 0.0F;    // w_e that a and c belong to
-    float torque_sum_nm = 0.0F;      // of T_prev + T, weighted by elapsed periods
-    float moment_sum_nm = 0.0F;      // the same, weighted by the periods before it
+    float leak = 1.0F;             // a
+    SpaceVector gain_s{};          // c
+    float frequency_rad_s = 0.0F;  // w_e that a and c belong to
+    float torque_sum_nm = 0.0F;    // of T_prev + T, weighted by elapsed periods
+    float moment_sum_nm = 0.0F;    // the same, weighted by the periods before it
     float power_sum_w = 0.0F;
     float current_sum_a2 = 0.0F;
     float elapsed_periods = 0.0F;
-    std::uint32_t samples = 0;       // since the start, saturating: the first has no predecessor
+    std::uint32_t samples = 0;  // since the start, saturating: the first has no predecessor
   };
 
   [[nodiscard]] static std::expected<FluxTorque, ConfigError> make(const Config& config) noexcept;

@@ -36,9 +36,12 @@ constexpr std::array<float, 4> folded(const Row& row, const Row& gain, const Row
 
 constexpr const Clarke& of(VoltageChannels channels) noexcept {
   switch (channels) {
-    case VoltageChannels::kLineToLine: return kLine;
-    case VoltageChannels::kTwoLineToLine: return kTwoLines;
-    case VoltageChannels::kLineToNeutral: break;
+    case VoltageChannels::kLineToLine:
+      return kLine;
+    case VoltageChannels::kTwoLineToLine:
+      return kTwoLines;
+    case VoltageChannels::kLineToNeutral:
+      break;
   }
   return kStar;
 }

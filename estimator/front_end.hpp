@@ -1,11 +1,11 @@
 // Raw channels to star-equivalent space vectors, amplitude-invariant.
 // Equations (E1)-(E8): estimator/EQUATIONS.md.
 //
-//   x = g (x_raw - o)                                    each channel, g and o from idle calibration
-//   v = (2/3) (v_u - (v_v + v_w)/2) + j (v_v - v_w)/sqrt(3)              line to neutral
-//   v = (v_uv - v_wu)/3 + j v_vw/sqrt(3),   v_wu = -(v_uv + v_vw)        line to line
-//   i = as the first line,                  i_w = -(i_u + i_v)           line currents
-//   v <- v exp(-j w_e t_lead)                            voltages sampled ahead of the currents
+//   x = g (x_raw - o)                                    each channel, g and o from idle
+//   calibration v = (2/3) (v_u - (v_v + v_w)/2) + j (v_v - v_w)/sqrt(3)              line to
+//   neutral v = (v_uv - v_wu)/3 + j v_vw/sqrt(3),   v_wu = -(v_uv + v_vw)        line to line i =
+//   as the first line,                  i_w = -(i_u + i_v)           line currents v <- v exp(-j
+//   w_e t_lead)                            voltages sampled ahead of the currents
 //
 // Assumes a three-wire motor: the zero sequence carries no power and does not appear in a vector.
 // A delta winding needs no other formula, only a third of its phase resistance (E8).
@@ -40,9 +40,9 @@ struct Calibration {
 };
 
 enum class VoltageChannels : std::uint8_t {
-  kLineToNeutral,    // u, v, w
-  kLineToLine,       // uv, vw, wu
-  kTwoLineToLine,    // uv, vw; the third is never read
+  kLineToNeutral,  // u, v, w
+  kLineToLine,     // uv, vw, wu
+  kTwoLineToLine,  // uv, vw; the third is never read
 };
 enum class CurrentChannels : std::uint8_t {
   kThree,  // u, v, w
@@ -51,7 +51,12 @@ enum class CurrentChannels : std::uint8_t {
 
 class FrontEnd {
  public:
-  enum class ConfigError : std::uint8_t { kVoltageGain, kVoltageOffset, kCurrentGain, kCurrentOffset };
+  enum class ConfigError : std::uint8_t {
+    kVoltageGain,
+    kVoltageOffset,
+    kCurrentGain,
+    kCurrentOffset
+  };
 
   struct Config {
     VoltageChannels voltages;
@@ -84,19 +89,18 @@ class FrontEnd {
   [[nodiscard]] Output step(const Input& input) const noexcept {
     const auto& v = input.voltage_v;
     const auto& i = input.current_a;
-    const SpaceVector raw{                                                                  // (E5)
-        map_.va[0] * v[0] + map_.va[1] * v[1] + map_.va[2] * v[2] - map_.va[3],
-        map_.vb[0] * v[1] + map_.vb[1] * v[2] - map_.vb[2]};
+    const SpaceVector raw{// (E5)
+                          map_.va[0] * v[0] + map_.va[1] * v[1] + map_.va[2] * v[2] - map_.va[3],
+                          map_.vb[0] * v[1] + map_.vb[1] * v[2] - map_.vb[2]};
     const SpaceVector r = state_.rotation;
-    return {.motor = {.voltage_v = {raw.alpha * r.alpha - raw.beta * r.beta,                // (E6)
+    return {.motor = {.voltage_v = {raw.alpha * r.alpha - raw.beta * r.beta,  // (E6)
                                     raw.alpha * r.beta + raw.beta * r.alpha},
                       .current_a = {map_.ia[0] * i[0] + map_.ia[1] * i[1] + map_.ia[2] * i[2] -
                                         map_.ia[3],
                                     map_.ib[0] * i[0] + map_.ib[1] * i[1] + map_.ib[2] * i[2] -
                                         map_.ib[3]}},
-            .current_residual_a =
-                map_.residual[0] * i[0] + map_.residual[1] * i[1] + map_.residual[2] * i[2] -
-                map_.residual[3]};
+            .current_residual_a = map_.residual[0] * i[0] + map_.residual[1] * i[1] +
+                                  map_.residual[2] * i[2] - map_.residual[3]};
   }
 
   // From the next sample on. Fails as Config::check(); then the old one stays.
@@ -111,9 +115,9 @@ class FrontEnd {
  private:
   // Rows of the affine map; the last number of each is the offset seen through it.
   struct Map {
-    std::array<float, 4> va;        // of v_1, v_2, v_3
-    std::array<float, 3> vb;        // of v_2, v_3
-    std::array<float, 4> ia;        // of i_u, i_v, i_w
+    std::array<float, 4> va;  // of v_1, v_2, v_3
+    std::array<float, 3> vb;  // of v_2, v_3
+    std::array<float, 4> ia;  // of i_u, i_v, i_w
     std::array<float, 4> ib;
     std::array<float, 4> residual;
   };

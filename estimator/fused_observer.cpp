@@ -11,14 +11,18 @@ constexpr float kTwoPi = 6.28318530718F;
 constexpr float kFrequencyTime_s = 0.015F;
 constexpr float kLowestFrequency_rad_s = kTwoPi * 3.0F;
 constexpr float kLock_s = 0.03F;
-constexpr float kInertiaWait_s = 0.1F;       // after the lock: the flux has settled
+constexpr float kInertiaWait_s = 0.1F;  // after the lock: the flux has settled
+constexpr float kEvenTurns = 1.5F;
 constexpr float kUncalibrated_ratio = 0.03F;
-constexpr float kTareFollow_ratio = 0.02F;   // of what the tare belongs to, each tick
+constexpr float kTareFollow_ratio = 0.02F;  // of what the tare belongs to, each tick
 
 float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
 
-float rotated(SpaceVector now, SpaceVector before) noexcept {
-  return angle_of(dot(now, before), cross(now, before));
+// Turned angle; of the angles that look the same, the one nearest to what is expected.
+float rotated(SpaceVector now, SpaceVector before, float expected_rad) noexcept {
+  const float angle = angle_of(dot(now, before), cross(now, before));
+  const float turns = (expected_rad - angle) / kTwoPi;
+  return angle + kTwoPi * static_cast<float>(static_cast<int>(turns + (turns < 0.0F ? -0.5F : 0.5F)));
 }
 
 }  // namespace
@@ -90,22 +94,39 @@ void FusedObserver::recalibrated(SpaceVector voltage_offset_v,
   if (tick_.calibrated != 0) return;  // a refinement: too small to upset what runs
   // What the filter has seen so far carries the ripple of the offsets: begin anew from the means.
   const LoadTorqueFilter::Noise& noise = noise_.noise();
-  filter_.start(noise_.explained_speed_rad_s(),
-                std::sqrt(noise.speed_variance + noise.angle_variance),
+  // A measured speed never carried it; the flux's did.
+  filter_.start(config_.sensorless ? noise_.explained_speed_rad_s() : noise_.last_speed_rad_s(),
+                std::sqrt(noise.speed_variance + 2.0F * noise.angle_variance),
                 noise_.mean_torque_nm(), kUncalibrated_ratio * config_.filter.rated_torque_nm);
   noise_.restart();
   air_.restart_average();
   tick_.calibrated = 1;
 }
 
+void FusedObserver::restart() noexcept {
+  FluxTorque::State flux{};
+  flux.leak = flux_.state().leak;
+  flux.gain_s = flux_.state().gain_s;
+  flux.frequency_rad_s = flux_.state().frequency_rad_s;
+  flux_.restore(flux);
+  tick_.locked_s = 0.0F;
+  tick_.acceleration_rad_s2 = 0.0F;
+  tick_.speed_sum_rad_s = 0.0F;
+  tick_.speed_count = 0;
+  tick_.ticks = 0;
+  noise_.restart();
+  ripple_.forget();
+}
+
 auto FusedObserver::rotation(const FluxTorque::Window& window) noexcept -> Rotation {
   const float l = config_.leakage_inductance_h;
   const SpaceVector i = window.current_a;
   const SpaceVector rotor{window.flux_v_s.alpha - l * i.alpha, window.flux_v_s.beta - l * i.beta};
+  const float expected = tick_.frequency_rad_s * window.duration_s;
   const Rotation result{
-      .flux_rad_s = rotated(rotor, tick_.rotor_flux_v_s) / window.duration_s,
-      .current_rad_s = rotated(i, tick_.current_a) / window.duration_s,
-      .flux_squared = dot(rotor, rotor)};  // (E100)
+      .flux_rad_s = rotated(rotor, tick_.rotor_flux_v_s, expected) / window.duration_s,
+      .current_rad_s = rotated(i, tick_.current_a, expected) / window.duration_s,
+                        .flux_squared = dot(rotor, rotor)};  // (E100)
   tick_.rotor_flux_v_s = rotor;
   tick_.current_a = i;
   return result;
@@ -115,7 +136,8 @@ void FusedObserver::track_frequency(const Rotation& r, float duration_s) noexcep
   const float w = tick_.frequency_rad_s;
   const float size = magnitude(w);
   const float flux_floor = 0.3F * config_.rated_flux_v_s;
-  const bool flux_agrees = r.flux_squared > flux_floor * flux_floor &&
+  // Until the offsets are taken out they turn the flux angle far more than the current's.
+  const bool flux_agrees = tick_.calibrated != 0 && r.flux_squared > flux_floor * flux_floor &&
                            magnitude(r.flux_rad_s - w) < 0.3F * size + 20.0F &&
                            magnitude(r.current_rad_s - w) < 0.5F * size + 60.0F;
   const float seen = flux_agrees ? r.flux_rad_s : r.current_rad_s;
@@ -140,12 +162,15 @@ auto FusedObserver::take_speed(const Rotation& r, float torque_nm, bool locked,
                                float duration_s) noexcept -> Speed {
   const auto samples = static_cast<float>(tick_.speed_count);
   Speed speed{.mean_rad_s = samples > 0.0F ? tick_.speed_sum_rad_s / samples : 0.0F,
+              .slip_rad_s = 0.0F,
               .samples = samples,
               .valid = samples > 0.0F};
   tick_.speed_sum_rad_s = 0.0F;
   tick_.speed_count = 0;
   if (!config_.sensorless) {
-    if (speed.valid) speed.mean_rad_s -= ripple_.step(speed.mean_rad_s, duration_s);
+    if (!speed.valid) return speed;
+    tick_.ripple_rad_s = ripple_.step(speed.mean_rad_s, duration_s);
+    speed.mean_rad_s -= tick_.ripple_rad_s;
     return speed;
   }
   const float p = config_.flux.pole_pairs;
@@ -153,6 +178,7 @@ auto FusedObserver::take_speed(const Rotation& r, float torque_nm, bool locked,
   const float slip = speed.valid ? 2.0F * config_.resistance.rotor_resistance_ohm * torque_nm /
                                        (3.0F * p * r.flux_squared)
                                  : 0.0F;
+  speed.slip_rad_s = slip;
   speed.mean_rad_s = (r.flux_rad_s - slip) / p;  // (E102)
   return speed;
 }
@@ -170,6 +196,7 @@ auto FusedObserver::unlocked(float speed_rad_s, AirCut::Feed feed, Output out) n
   ripple_.forget();
   static_cast<void>(air_.step({.load_torque_nm = 0.0F,
                                .sigma_nm = 0.0F,
+                               .model_sigma_nm = 0.0F,
                                .airgap_torque_nm = 0.0F,
                                .speed_rad_s = speed_rad_s,
                                .speed_sigma_rad_s = 0.0F,
@@ -177,8 +204,12 @@ auto FusedObserver::unlocked(float speed_rad_s, AirCut::Feed feed, Output out) n
                                .feed = feed,
                                .calibrated = tick_.calibrated != 0,
                                .valid = false}));
-  inertia_.step({.torque_nm = 0.0F, .speed_rad_s = 0.0F, .duration_s = out.duration_s,
-                 .valid = false, .tared = false, .tare_nm = 0.0F});
+  inertia_.step({.torque_nm = 0.0F,
+                 .speed_rad_s = 0.0F,
+                 .duration_s = out.duration_s,
+                 .valid = false,
+                 .tared = false,
+                 .tare_nm = 0.0F});
   out.valid = false;
   out.phase = AirCut::Phase::kUnsteady;
   out.speed_rad_s = speed_rad_s;
@@ -193,8 +224,8 @@ float FusedObserver::sigma_nm(const LoadTorqueFilter::Output& load, const AirCut
   const float inertia = inertia_.sigma_ratio() * (torque_nm - load.load_torque_nm);
   const float resistance = resistance_.change_sigma_ohm() * (copper - tick_.idle_copper);
   const float moved = 0.7F * change_nm;
-  const float noise = load.variance_nm2 > air.idle_variance_nm2 ? load.variance_nm2
-                                                                : air.idle_variance_nm2;
+  const float noise =
+      load.variance_nm2 > air.idle_variance_nm2 ? load.variance_nm2 : air.idle_variance_nm2;
   return std::sqrt(noise + model * model + scale * scale + inertia * inertia +
                    resistance * resistance + moved * moved +
                    air.tare_sigma_nm * air.tare_sigma_nm);  // (E104)
@@ -222,7 +253,23 @@ void FusedObserver::learn(const FluxTorque::Window& window, const Rotation& r, c
                     .torque_nm = window.torque_nm,
                     .current_squared_a2 = window.current_squared_a2,
                     .duration_s = out.duration_s,
-                    .steady = out.steady && tick_.calibrated != 0});
+                    .steady = tick_.even_s > 0.0F && tick_.calibrated != 0});
+}
+
+auto FusedObserver::delayed(float torque_nm, float moment_nm) noexcept -> std::array<float, 2> {
+  if (config_.speed_delay_ticks == 0) return {torque_nm, moment_nm};
+  constexpr std::uint32_t kSize = kLongestDelay + 1;
+  if (tick_.ticks == 0) {
+    for (std::uint32_t k = 0; k < kSize; ++k) {
+      tick_.delayed_nm[2 * k] = torque_nm;
+      tick_.delayed_nm[2 * k + 1] = moment_nm;
+    }
+  }
+  const std::uint32_t now = 2 * (tick_.ticks % kSize);
+  tick_.delayed_nm[now] = torque_nm;
+  tick_.delayed_nm[now + 1] = moment_nm;
+  const std::uint32_t then = 2 * ((tick_.ticks + kSize - config_.speed_delay_ticks) % kSize);
+  return {tick_.delayed_nm[then], tick_.delayed_nm[then + 1]};
 }
 
 auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
@@ -246,17 +293,19 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
   const float torque = window.torque_nm + correction_nm(window, copper);
   LoadTorqueFilter::Noise noise = noise_.noise();
   const bool by_angle = noise_.counts() || config_.sensorless;
-  noise.centre_ratio = by_angle ? 0.5F : 0.5F - 0.5F / (speed.samples > 1.0F ? speed.samples : 1.0F);
+  noise.centre_ratio =
+      by_angle ? 0.5F : 0.5F - 0.5F / (speed.samples > 1.0F ? speed.samples : 1.0F);
   if (config_.sensorless) noise.torque_variance *= 4.0F;
-  const LoadTorqueFilter::Input input{
-      .torque_nm = torque,
-      .moment_nm = by_angle ? window.moment_nm + 0.5F * window.torque_nm *
-                                                     config_.flux.sample_period_s / h
-                            : window.moment_nm,
-      .speed_rad_s = speed.mean_rad_s,
-      .duration_s = h,
-      .inertia_kg_m2 = inertia_.inertia_kg_m2(),
-      .speed_valid = speed.valid};
+  const float moment =
+      by_angle ? window.moment_nm + 0.5F * window.torque_nm * config_.flux.sample_period_s / h
+               : window.moment_nm;
+  const auto [waited_nm, waited_moment_nm] = delayed(torque, moment);
+  const LoadTorqueFilter::Input input{.torque_nm = waited_nm,
+                                      .moment_nm = waited_moment_nm,
+                                      .speed_rad_s = speed.mean_rad_s,
+                                      .duration_s = h,
+                                      .inertia_kg_m2 = inertia_.inertia_kg_m2(),
+                                      .speed_valid = speed.valid};
   if (tick_.ticks == 0) {
     filter_.start(speed.mean_rad_s, 1.0F, torque, config_.filter.rated_torque_nm);
   }
@@ -268,23 +317,30 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
   const AirCut::Output air =
       air_.step({.load_torque_nm = load.load_torque_nm,
                  .sigma_nm = std::sqrt(load.variance_nm2),
+                 .model_sigma_nm = magnitude(resistance_.change_sigma_ohm() * copper),
                  .airgap_torque_nm = torque,
-                 .speed_rad_s = load.speed_rad_s,
-                 .speed_sigma_rad_s =
-                     std::sqrt(noise.speed_variance + 2.0F * noise.angle_variance),
+                 // The field's own speed is calmer than what the flux says of the shaft's.
+                 .speed_rad_s = config_.sensorless ? (tick_.frequency_rad_s - speed.slip_rad_s) / p
+                                                    : load.speed_rad_s,
+                 .speed_sigma_rad_s = std::sqrt(noise.speed_variance + 2.0F * noise.angle_variance),
                  .duration_s = h,
                  .feed = feed,
                  .calibrated = tick_.calibrated != 0,
                  .valid = true});
   const bool idle = air.phase == AirCut::Phase::kIdle;
   if (speed.valid) {
-    noise_.step({.torque_nm = torque,
+    noise_.step({.torque_nm = input.torque_nm,
                  .moment_nm = input.moment_nm,
                  .speed_rad_s = speed.mean_rad_s,
                  .duration_s = h,
                  .inertia_kg_m2 = input.inertia_kg_m2,
                  .idle = idle,
                  .calibrated = tick_.calibrated != 0});
+  }
+  // Before the first tare a ripple may be what keeps the torque from being known well enough.
+  const bool even = air.steady && tick_.calibrated != 0 && !air.has_tare;
+  if ((idle || even) && speed.valid && !config_.sensorless) {
+    ripple_.learn(noise_.rest_rad_s() + tick_.ripple_rad_s, h);
   }
   inertia_.step({.torque_nm = window.torque_nm,
                  .speed_rad_s = load.speed_rad_s,
@@ -294,8 +350,18 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .tare_nm = air.tare_nm});
 
   out.valid = true;
-  out.steady = air.steady;
+  if (air.steady) {
+    tick_.even_angle_rad += r.current_rad_s * h;
+    tick_.even_s += h;
+  } else {
+    tick_.even_angle_rad = tick_.even_s = 0.0F;
+  }
+  // Channel offsets ripple the angle once a turn of the field: only the mean of turns counts.
+  if (magnitude(tick_.even_angle_rad) > kEvenTurns * kTwoPi) {
+    out.even_frequency_rad_s = tick_.even_angle_rad / tick_.even_s;
+  }
   out.calibrated = tick_.calibrated != 0;
+  out.tared = air.has_tare;
   out.phase = air.phase;
   out.airgap_torque_nm = torque;
   out.load_torque_nm = load.load_torque_nm;

@@ -1,18 +1,18 @@
 // Cutting torque from phase voltages and currents, speed, the slow power meter and their noise.
 //
 // Once a raw sample: FluxTorque, the air-gap torque. Once a tick (1 ms):
-//   frequency  psi_R = psi - L_sigma i;  w_psi = arg(psi_R conj psi_R,prev)/h, w_i likewise   (E100)
+//   frequency  psi_R = psi - L_sigma i;  w_psi = arg(psi_R conj psi_R,prev)/h, w_i likewise (E100)
 //              w_e += s (w_x - w_e) + a_e h,  a_e += s^2/4 (w_x - w_e)/h,  s = 1 - exp(-h/15 ms)
-//              w_x = w_psi once it agrees, else w_i                                          (E101)
+//              w_x = w_psi once calibrated and agreeing, else w_i (E101)
 //   speed      measured less its ripple, or without a sensor
-//              (w_psi - w_sl)/p, w_sl = 2 R_R T_m / (3 p |psi_R|^2)                            (E102)
+//              (w_psi - w_sl)/p, w_sl = 2 R_R T_m / (3 p |psi_R|^2) (E102)
 //   noise      NoiseMeter (E103);  ripple  SpeedRipple (E105)
 //   torque     T' = T - dR (x - x_tare) + (g - 1)(P_i - P_i,tare) p / w_e      StatorResistance
 //              (E111), PowerScale (E122)
 //   load       LoadTorqueFilter (E70)-(E74);  inertia  RunUpInertia (E115)
 //   tare       AirCut (E90)-(E92)
 //   sigma      sum of squares of: filter or idle scatter, model floor 5e-4 T_n, 0.3 % of the
-//              torque, inertia, resistance, time stamp (change of this tick), tare              (E104)
+//              torque, inertia, resistance, time stamp (change of this tick), tare (E104)
 // Below 3 Hz stator frequency there is no estimate. Source: ESTIMATOR prototype 1; changes and
 // derivations in EQUATIONS.md.
 #pragma once
@@ -37,7 +37,13 @@ namespace cutforce::estimator {
 class FusedObserver {
  public:
   enum class ConfigError : std::uint8_t {
-    kFlux, kFilter, kAir, kInertia, kResistance, kMeter, kMotor
+    kFlux,
+    kFilter,
+    kAir,
+    kInertia,
+    kResistance,
+    kMeter,
+    kMotor
   };
 
   struct Config {
@@ -47,11 +53,12 @@ class FusedObserver {
     RunUpInertia::Config inertia;
     StatorResistance::Config resistance;
     PowerScale::Config meter;
-    float leakage_inductance_h;      // star-equivalent, inverse-gamma
-    float rated_flux_v_s;            // about; decides only what is plausible
-    bool sensorless;                 // speed from the flux
+    float leakage_inductance_h;       // star-equivalent, inverse-gamma
+    float rated_flux_v_s;             // about; decides only what is plausible
+    std::uint32_t speed_delay_ticks;  // the measured speed is this late; the torque waits for it
+    bool sensorless;                  // speed from the flux
     bool track_resistance;
-    bool calibrate;                  // wait for the idle calibration before the first tare
+    bool calibrate;  // wait for the idle calibration before the first tare
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       if (!flux.check()) return std::unexpected{ConfigError::kFlux};
@@ -60,11 +67,14 @@ class FusedObserver {
       if (!inertia.check()) return std::unexpected{ConfigError::kInertia};
       if (!resistance.check()) return std::unexpected{ConfigError::kResistance};
       if (!meter.check()) return std::unexpected{ConfigError::kMeter};
-      if (!(leakage_inductance_h >= 0.0F && rated_flux_v_s > 0.0F))
+      if (!(leakage_inductance_h >= 0.0F && rated_flux_v_s > 0.0F &&
+            speed_delay_ticks <= kLongestDelay))
         return std::unexpected{ConfigError::kMotor};
       return {};
     }
   };
+
+  static constexpr std::uint32_t kLongestDelay = 15;  // ticks
 
   struct Sample {
     MotorSample motor;
@@ -76,20 +86,21 @@ class FusedObserver {
   };
 
   struct Output {
-    bool valid;                    // an estimate exists
-    bool steady;                   // speed stands still: channel offsets can be measured
+    bool valid;  // an estimate exists
     bool calibrated;
+    bool tared;
     AirCut::Phase phase;
     float airgap_power_w;
-    float airgap_torque_nm;        // mean of the tick, corrected
-    float load_torque_nm;          // after inertia
-    float net_torque_nm;           // less nominal friction and tare: T_C + load friction
+    float airgap_torque_nm;  // mean of the tick, corrected
+    float load_torque_nm;    // after inertia
+    float net_torque_nm;     // less nominal friction and tare: T_C + load friction
     float net_sigma_nm;
     float speed_rad_s;
-    float frequency_rad_s;         // electrical
+    float frequency_rad_s;       // electrical
+    float even_frequency_rad_s;  // its mean since the speed stands still; 0: not for long enough
     float tare_nm;
     float tare_age_s;
-    float idle_s;                  // time in this idle
+    float idle_s;  // time in this idle
     float duration_s;
   };
 
@@ -99,15 +110,19 @@ class FusedObserver {
     float frequency_rad_s = 0.0F;
     float acceleration_rad_s2 = 0.0F;  // of the frequency
     float locked_s = 0.0F;
+    float even_angle_rad = 0.0F;  // that the flux has turned since the speed stands still
+    float even_s = 0.0F;
     float speed_sum_rad_s = 0.0F;
     std::uint32_t speed_count = 0;
     float meter_w = 0.0F;
     std::uint32_t meter_count = 0;
+    float ripple_rad_s = 0.0F;       // taken off the speed of this tick
     float load_torque_nm = 0.0F;
-    float idle_copper = 0.0F;        // x of (E110) when the tare was taken
+    float idle_copper = 0.0F;           // x of (E110) when the tare was taken
     float idle_power_torque_nm = 0.0F;  // P_i p / w_e likewise
-    std::uint32_t ticks = 0;         // since the estimate became valid
+    std::uint32_t ticks = 0;            // since the estimate became valid
     std::uint32_t calibrated = 0;
+    std::array<float, 2 * (kLongestDelay + 1)> delayed_nm{};  // torque and its moment, a ring
   };
 
   struct State {
@@ -122,10 +137,14 @@ class FusedObserver {
     Tick tick;
   };
 
-  [[nodiscard]] static std::expected<FusedObserver, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static std::expected<FusedObserver, ConfigError> make(
+      const Config& config) noexcept;
 
   void step(const Sample& sample) noexcept;
   [[nodiscard]] Output tick(AirCut::Feed feed) noexcept;
+
+  // Samples are missing: what was learned stays, what was integrated begins anew.
+  void restart() noexcept;
 
   // Voltages and currents to come are corrected by these offsets (idle calibration).
   void recalibrated(SpaceVector voltage_offset_v, SpaceVector current_offset_a) noexcept;
@@ -143,6 +162,7 @@ class FusedObserver {
   };
   struct Speed {
     float mean_rad_s;
+    float slip_rad_s;  // electrical; sensorless only
     float samples;
     bool valid;
   };
@@ -150,6 +170,7 @@ class FusedObserver {
   void track_frequency(const Rotation& rotation, float duration_s) noexcept;
   [[nodiscard]] Speed take_speed(const Rotation& rotation, float torque_nm, bool locked,
                                  float duration_s) noexcept;
+  [[nodiscard]] std::array<float, 2> delayed(float torque_nm, float moment_nm) noexcept;
   [[nodiscard]] float correction_nm(const FluxTorque::Window& window, float copper) const noexcept;
   void learn(const FluxTorque::Window& window, const Rotation& rotation, const Output& out,
              float copper, float speed_rad_s) noexcept;

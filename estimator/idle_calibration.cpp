@@ -76,7 +76,9 @@ void IdleCalibration::open(float frequency_rad_s, float at_least_s) noexcept {
   const Phasor carrier = unit_phasor(angle < kTwoPi ? angle : 0.0F);
   const Phasor hann = unit_phasor(kTwoPi / static_cast<float>(state_.length));
   state_.phasors = {1.0F, 0.0F, 1.0F, 0.0F};
-  state_.rotations = {carrier.re, -carrier.im, hann.re, hann.im};
+  // exp(-j w_e t) with the sign of w_e: (E83) must know which sequence is the negative one.
+  const float sense = frequency_rad_s < 0.0F ? -1.0F : 1.0F;
+  state_.rotations = {carrier.re, -sense * carrier.im, hann.re, hann.im};
 }
 
 void IdleCalibration::step(const Channels& channels) noexcept {

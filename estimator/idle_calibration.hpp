@@ -24,9 +24,9 @@ class IdleCalibration {
 
   struct Config {
     float sample_period_s;
-    float shortest_s;            // window length at least
-    float shortest_periods;      // electrical periods at least, >= 2
-    float gain_limit_ratio;      // a gain correction beyond it is not believed
+    float shortest_s;        // window length at least
+    float shortest_periods;  // electrical periods at least, >= 2
+    float gain_limit_ratio;  // a gain correction beyond it is not believed
     bool three_currents;
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
@@ -51,9 +51,9 @@ class IdleCalibration {
     Channels mean{};
     Channels real{};
     Channels imaginary{};
-    std::array<float, 4> phasors{};   // exp(-j w_e t), exp(j 2 pi t / N T_s)
+    std::array<float, 4> phasors{};  // exp(-j w_e t), exp(j 2 pi t / N T_s)
     std::array<float, 4> rotations{};
-    std::uint32_t length = 0;         // N; 0: no window open
+    std::uint32_t length = 0;  // N; 0: no window open
     std::uint32_t filled = 0;
   };
 

@@ -74,8 +74,9 @@ void LoadTorqueFilter::start(float speed_rad_s, float speed_sigma_rad_s, float t
                              float torque_sigma_nm) noexcept {
   for (Model& m : state_.models) {
     m.mean = {0.0F, speed_rad_s, torque_nm};
-    m.covariance = {0.0F, 0.0F, 0.0F, speed_sigma_rad_s * speed_sigma_rad_s, 0.0F,
-                    torque_sigma_nm * torque_sigma_nm};
+    m.covariance = {0.0F, 0.0F,
+                    0.0F, speed_sigma_rad_s * speed_sigma_rad_s,
+                    0.0F, torque_sigma_nm * torque_sigma_nm};
   }
   state_.edge_probability = 0.5F;
   state_.started = 1;

@@ -30,10 +30,10 @@ class LoadTorqueFilter {
   enum class ConfigError : std::uint8_t { kPeriod, kTorque, kSlope };
 
   struct Config {
-    float tick_s;                  // nominal
-    float rated_torque_nm;         // scales everything below
-    float edge_slope_1_s;          // steepest slope to be followed, rated torques per second
-    float drift_1_sqrt_s;          // drift in the cut, rated torques per root second
+    float tick_s;           // nominal
+    float rated_torque_nm;  // scales everything below
+    float edge_slope_1_s;   // steepest slope to be followed, rated torques per second
+    float drift_1_sqrt_s;   // drift in the cut, rated torques per root second
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       if (!(tick_s > 0.0F)) return std::unexpected{ConfigError::kPeriod};
@@ -52,18 +52,18 @@ class LoadTorqueFilter {
   };
 
   struct Input {
-    float torque_nm;     // T_m
-    float moment_nm;     // M
-    float speed_rad_s;   // w_m
-    float duration_s;    // of this tick
+    float torque_nm;    // T_m
+    float moment_nm;    // M
+    float speed_rad_s;  // w_m
+    float duration_s;   // of this tick
     float inertia_kg_m2;
-    bool speed_valid;    // false: predict only
+    bool speed_valid;  // false: predict only
   };
 
   struct Output {
     float load_torque_nm;
-    float variance_nm2;      // of the mixture
-    float speed_rad_s;       // filtered, end of the tick
+    float variance_nm2;  // of the mixture
+    float speed_rad_s;   // filtered, end of the tick
     float edge_probability;
     float innovation_rad_s;  // of the quiet model
   };

@@ -4,15 +4,18 @@ namespace cutforce::estimator {
 namespace {
 
 constexpr float kExplainTime_s = 0.1F;
-constexpr float kSpeedFloor_rad_s = 3e-5F;  // rounding of a recorded speed
-constexpr float kFluxFloor_rad_s = 0.01F;   // the flux angle is no better
+constexpr float kSpeedFloor_rad_s = 3e-5F;                // rounding of a recorded speed
+constexpr float kFluxFloor_rad_s = 0.02F;                 // the flux angle is no better
 constexpr std::uint32_t kHistory = 2 * NoiseMeter::kLag;  // ticks until the differences are filled
 constexpr std::uint32_t kBlock = 50;                      // ticks
 constexpr std::uint32_t kMostBlocks = 16;
 constexpr float kLoud_ratio = 2.5F;
+constexpr std::uint32_t kLastingLoud = 5;  // blocks
 constexpr float kQuiet_ratio = 0.4F;
 constexpr float kColour_ratio = 1.5F;
-constexpr float kCoarse_rad_s = 0.3F;        // a finer quantum is the number format's or an ADC's
+constexpr float kCoarse_rad_s = 0.3F;  // a finer quantum is the number format's or an ADC's
+constexpr float kWhiteBeat = 0.25F;    // of the tick rate
+constexpr float kSlowestBeat = 0.03F;
 constexpr std::uint32_t kSureQuantised = 60;
 constexpr float kFirstSpeed_rad_s = 0.03F;
 constexpr float kFirstTorque_ratio = 0.02F;
@@ -85,8 +88,7 @@ void NoiseMeter::step(const Input& in) noexcept {
   const std::size_t at = s.ticks % size;
   const float change = rest - s.rests_rad_s[(s.ticks + size - 1) % size];
   const float lagged = rest - 2.0F * s.rests_rad_s[(s.ticks + kLag) % size] + s.rests_rad_s[at];
-  const float d3 =
-      in.torque_nm - 3.0F * s.torques_nm[0] + 3.0F * s.torques_nm[1] - s.torques_nm[2];
+  const float d3 = in.torque_nm - 3.0F * s.torques_nm[0] + 3.0F * s.torques_nm[1] - s.torques_nm[2];
   const float d2 = unexplained - 2.0F * s.unexplained_nm[0] + s.unexplained_nm[1];
   if (s.ticks > kHistory) {
     if (!config_.sensorless) find_quantum(raw_change);
@@ -115,7 +117,9 @@ void NoiseMeter::close_block(bool of_speed) noexcept {
   const Differences d = s.block;
   s.block = {};
   s.filled = 0;
-  const bool first = s.blocks == 0;
+  if (of_speed) s.loud = d.e0 * kShare > kLoud_ratio * s.mean.e0 ? s.loud + 1 : 0;
+  const bool first = s.blocks == 0 || s.loud >= kLastingLoud;
+  if (first) s.blocks = s.loud = 0;
   if (s.blocks < kMostBlocks && of_speed) ++s.blocks;
   const float share = 1.0F / static_cast<float>(of_speed ? s.blocks : kMostBlocks);
   const auto blend = [first, share](float& mean, float sum) {
@@ -135,9 +139,8 @@ void NoiseMeter::close_block(bool of_speed) noexcept {
   if (!of_speed) return;
   const float before = s.mean.e0;
   const float weight = blend(s.mean.e0, d.e0);
-  const float keep = weight < 1.0F && before > 0.0F
-                         ? (s.mean.e0 - weight * d.e0 * kShare) / before
-                         : 0.0F;
+  const float keep =
+      weight < 1.0F && before > 0.0F ? (s.mean.e0 - weight * d.e0 * kShare) / before : 0.0F;
   s.mean.e1 = keep * s.mean.e1 + weight * d.e1 * kShare;
   static_cast<void>(blend(s.mean.lagged, d.lagged));
 }
@@ -153,7 +156,14 @@ void NoiseMeter::set_noise(float duration_s) noexcept {
   float floor = kSpeedFloor_rad_s * kSpeedFloor_rad_s;
   if (config_.sensorless) floor += kFluxFloor_rad_s * kFluxFloor_rad_s;
   if (counts()) {
-    angle = s.quantum_rad_s * s.quantum_rad_s * (1.0F / 12.0F);
+    // A sawtooth at the beat of counts and ticks; the slower, the more of it is in the filter's
+    // band.
+    const float counts_a_tick = magnitude(s.explained_rad_s) / s.quantum_rad_s;
+    const float beat =
+        magnitude(counts_a_tick - static_cast<float>(static_cast<int>(counts_a_tick + 0.5F)));
+    const float colour = beat < kSlowestBeat ? kWhiteBeat / kSlowestBeat
+                                             : (beat < kWhiteBeat ? kWhiteBeat / beat : 1.0F);
+    angle = colour * s.quantum_rad_s * s.quantum_rad_s * (1.0F / 12.0F);
     white = 0.0F;
   } else {
     const float known = white + 2.0F * angle;
@@ -165,7 +175,9 @@ void NoiseMeter::set_noise(float duration_s) noexcept {
   if (!(samples > 1.0F)) samples = 1.0F;
   // The trapezoid shares each sample at a tick's end between two ticks; differences hide that.
   const float third = s.mean.third_nm2 * samples / (samples - 0.875F);
-  const float second = s.mean.second_nm2 * samples / (samples - 0.833F);
+  // M spreads a tick's noise over two differences besides: 6 (8 n^2 - 5)/(18 n^2) is left of it.
+  const float square = samples * samples;
+  const float second = s.mean.second_nm2 * 18.0F * square / (8.0F * square - 5.0F);
   s.noise.torque_variance = third < second ? third : second;
 }
 

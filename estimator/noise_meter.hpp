@@ -6,11 +6,14 @@
 //   slow noise shows in the second difference over kLag ticks: E = W + 2 A + slow
 // and for the torque, whichever is less of
 //   E[(third difference of T)^2] / 20   and   E[(second difference of T - J dw/h)^2] / 6,
-// divided by what the trapezoid over n samples leaves of white noise in these differences.
-// A speed that only comes in multiples of one quantum q is made of encoder counts: A = q^2/12.
+// divided by what the trapezoid over n samples leaves of white noise in these differences,
+// (n - 7/8)/n and (8 n^2 - 5)/(18 n^2): in the second T stands as T - M + M_prev, for dw is of means.
+// A speed that only comes in multiples of one quantum q is made of encoder counts: A = c q^2/12, c
+// from the beat of counts and ticks.
 // Averages are of blocks of 50 ticks; a block much quieter than the mean replaces it (the mean
-// held a transient), a much louder one counts as a little louder only.
-// Source: ESTIMATOR prototype 1.3, tuning; the split of white, bounded and slow noise: EQUATIONS.md.
+// held a transient), a much louder one counts as a little louder only, unless it goes on.
+// Source: ESTIMATOR prototype 1.3, tuning; the split of white, bounded and slow noise:
+// EQUATIONS.md.
 #pragma once
 
 #include <array>
@@ -63,11 +66,12 @@ class NoiseMeter {
     Differences block{};
     Differences mean{};
     float quantum_rad_s = 0.0F;
-    std::uint32_t quantised = 0;      // changes that were multiples of it
-    std::uint32_t filled = 0;         // ticks in the block
-    std::uint32_t blocks = 0;         // in the mean
-    std::uint32_t ticks = 0;          // since the rest began anew
-    std::uint32_t idle = 0;           // the last tick was idle
+    std::uint32_t quantised = 0;  // changes that were multiples of it
+    std::uint32_t filled = 0;     // ticks in the block
+    std::uint32_t blocks = 0;     // in the mean
+    std::uint32_t loud = 0;       // loud blocks in a row
+    std::uint32_t ticks = 0;      // since the rest began anew
+    std::uint32_t idle = 0;       // the last tick was idle
     std::uint32_t idle_measured = 0;
   };
 
@@ -80,6 +84,7 @@ class NoiseMeter {
 
   [[nodiscard]] const LoadTorqueFilter::Noise& noise() const noexcept { return state_.noise; }
   [[nodiscard]] float mean_torque_nm() const noexcept { return state_.mean_torque_nm; }
+  [[nodiscard]] float last_speed_rad_s() const noexcept { return state_.last_speed_rad_s; }
   [[nodiscard]] float explained_speed_rad_s() const noexcept { return state_.explained_rad_s; }
   // Speed that neither torque nor drift explains, of the last tick.
   [[nodiscard]] float rest_rad_s() const noexcept;

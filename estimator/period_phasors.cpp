@@ -32,8 +32,8 @@ constexpr CosineSine cosine_sine(float angle_rad) noexcept {
 constexpr float wrapped(float angle_rad) noexcept {
   const float turns = angle_rad * (1.0F / kTurn);
   if (!(turns > -1e6F && turns < 1e6F)) return 0.0F;
-  return angle_rad - kTurn * static_cast<float>(static_cast<std::int32_t>(
-                                 turns + (turns < 0.0F ? -0.5F : 0.5F)));
+  return angle_rad - kTurn * static_cast<float>(
+                                 static_cast<std::int32_t>(turns + (turns < 0.0F ? -0.5F : 0.5F)));
 }
 
 }  // namespace
@@ -48,16 +48,17 @@ bool PeriodPhasors::step(const Input& input) noexcept {
   const float advance = std::fabs(input.angle_rad);
   if (state_.observations == 0) {
     const float turns = static_cast<float>(kLeastObservations) * advance * (1.0F / kTurn);
-    state_.target_rad = kTurn * static_cast<float>(
-                                    1 + static_cast<std::int32_t>(turns < 1e3F ? turns : 1e3F));
+    state_.target_rad =
+        kTurn * static_cast<float>(1 + static_cast<std::int32_t>(turns < 1e3F ? turns : 1e3F));
   }
   state_.theta_rad = wrapped(state_.theta_rad + input.angle_rad);
   const CosineSine e = cosine_sine(state_.theta_rad);
-  const std::array<float, 11> signals{
-      input.channel[0],           input.channel[1],          input.channel[2],
-      input.channel[3],           input.channel[4],          input.channel[5],
-      input.current_residual_a,   input.motor.voltage_v.alpha, input.motor.voltage_v.beta,
-      input.motor.current_a.alpha, input.motor.current_a.beta};
+  const std::array<float, 11> signals{input.channel[0],           input.channel[1],
+                                      input.channel[2],           input.channel[3],
+                                      input.channel[4],           input.channel[5],
+                                      input.current_residual_a,   input.motor.voltage_v.alpha,
+                                      input.motor.voltage_v.beta, input.motor.current_a.alpha,
+                                      input.motor.current_a.beta};
   for (std::size_t k = 0; k < signals.size(); ++k) {  // (E12)
     state_.cosine_sum[k] += signals[k] * e.cosine;
     state_.sine_sum[k] += signals[k] * e.sine;

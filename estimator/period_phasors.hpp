@@ -1,13 +1,13 @@
 // Every channel's fundamental over whole electrical periods, from a few samples a period.
 // Equations (E12)-(E13): estimator/EQUATIONS.md.
 //
-//   theta = sum w_e dt                      the angle that the frequency, known elsewhere, has swept
-//   X = (2/N) sum x exp(-j theta)           phasor of a channel, peak value
-//   x+ = (1/N) sum x exp(-j theta),  x- = conj((1/N) sum x exp(j theta))       of a space vector
+//   theta = sum w_e dt                      the angle that the frequency, known elsewhere, has
+//   swept X = (2/N) sum x exp(-j theta)           phasor of a channel, peak value x+ = (1/N) sum x
+//   exp(-j theta),  x- = conj((1/N) sum x exp(j theta))       of a space vector
 //
 // Assumes the frequency right to about 20 % (a phasor then loses 7 %); whether the signals turn at
-// that frequency at all is told by `coherence`. A constant offset drops out. The window ends with the
-// first whole period that holds kLeastObservations.
+// that frequency at all is told by `coherence`. A constant offset drops out. The window ends with
+// the first whole period that holds kLeastObservations.
 //
 // Cost of an observation: 24 multiplications and 30 additions for the sums, about 25 operations for
 // sine and cosine; no division. Errors of sine and cosine: below 1e-6.
@@ -44,8 +44,8 @@ class PeriodPhasors {
     std::array<float, kChannels> mean;
     Sequences voltage_v;
     Sequences current_a;
-    float residual_a;   // peak of i_u + i_v + i_w
-    float coherence;    // share of |i|^2 that turns at the frequency, 0..1
+    float residual_a;  // peak of i_u + i_v + i_w
+    float coherence;   // share of |i|^2 that turns at the frequency, 0..1
   };
 
   struct State {
@@ -53,8 +53,8 @@ class PeriodPhasors {
     std::array<float, 11> sine_sum{};
     std::array<float, kChannels> sum{};
     float current_square_sum = 0.0F;
-    float theta_rad = 0.0F;   // within +-pi
-    float swept_rad = 0.0F;   // in this window, unsigned
+    float theta_rad = 0.0F;  // within +-pi
+    float swept_rad = 0.0F;  // in this window, unsigned
     float target_rad = 0.0F;
     std::uint32_t observations = 0;
   };

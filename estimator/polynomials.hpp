@@ -59,8 +59,7 @@ namespace cutforce::estimator {
   const float n = static_cast<float>(power);
   const float r = (x - n * 0.693359375F) + n * 2.12194440e-4F;
   const float poly =
-      ((((1.9875691500e-4F * r + 1.3981999507e-3F) * r + 8.3334519073e-3F) * r +
-        4.1665795894e-2F) *
+      ((((1.9875691500e-4F * r + 1.3981999507e-3F) * r + 8.3334519073e-3F) * r + 4.1665795894e-2F) *
            r +
        1.6666665459e-1F) *
           r +

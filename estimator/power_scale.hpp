@@ -23,9 +23,9 @@ class PowerScale {
   struct Config {
     float lag_s;
     float rated_power_w;
-    float gain_sigma_ratio;    // of voltage times current, 1 sigma
-    float meter_sigma_ratio;   // of the meter's scale, 1 sigma
-    float implausible_ratio;   // beyond this deviation the meter is not believed
+    float gain_sigma_ratio;   // of voltage times current, 1 sigma
+    float meter_sigma_ratio;  // of the meter's scale, 1 sigma
+    float implausible_ratio;  // beyond this deviation the meter is not believed
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       if (!(lag_s > 0.0F)) return std::unexpected{ConfigError::kLag};
@@ -64,24 +64,33 @@ class PowerScale {
     // While the power still moves, an error of the lag shows as an error of the scale.
     const float moving = (power_w - state_.lagged_w) / state_.lagged_w;
     const float from_lag = kLagError_ratio * moving;
-    const float noise = (config_.meter_sigma_ratio * config_.meter_sigma_ratio + from_lag * from_lag) *
-                        kCorrelation_s / duration_s;
+    const float noise =
+        (config_.meter_sigma_ratio * config_.meter_sigma_ratio + from_lag * from_lag) *
+        kCorrelation_s / duration_s;
     const float gain = state_.variance / (state_.variance + noise);
     state_.gain += gain * (1.0F + off - state_.gain);
     state_.variance *= 1.0F - gain;
     const float floor = config_.meter_sigma_ratio * config_.meter_sigma_ratio;
     const float least = floor < config_.gain_sigma_ratio * config_.gain_sigma_ratio
-                            ? floor : config_.gain_sigma_ratio * config_.gain_sigma_ratio;
+                            ? floor
+                            : config_.gain_sigma_ratio * config_.gain_sigma_ratio;
     if (state_.variance < least) state_.variance = least;
   }
 
-  [[nodiscard]] constexpr float gain_ratio() const noexcept { return state_.gain; }
+  // Without what the meter's own uncertainty explains: a check, not a second source.
+  [[nodiscard]] constexpr float gain_ratio() const noexcept {
+    const float off = state_.gain - 1.0F;
+    const float excused = kExcused_sigmas * config_.meter_sigma_ratio;
+    if (off > excused) return 1.0F + (off - excused);
+    return off < -excused ? 1.0F + (off + excused) : 1.0F;
+  }
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
   constexpr void restore(const State& state) noexcept { state_ = state; }
 
  private:
+  static constexpr float kExcused_sigmas = 0.4F;
   static constexpr float kSmallestPower_ratio = 0.2F;
-  static constexpr float kLagError_ratio = 0.3F;
+  static constexpr float kLagError_ratio = 0.1F;
   static constexpr float kCorrelation_s = 0.1F;  // readings within it are one
 
   explicit constexpr PowerScale(const Config& config) noexcept : config_(config) {}

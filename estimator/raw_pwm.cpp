@@ -53,11 +53,11 @@ void RawPwmDetector::close_window() noexcept {
   const float advance = std::fabs(state_.swept_rad) / n;
   const float sixths = std::min(advance / kSixth_rad, 1e6F);
   const float off_step =
-      kSixth_rad *
-      std::fabs(sixths - static_cast<float>(static_cast<std::int32_t>(sixths + 0.5F)));
+      kSixth_rad * std::fabs(sixths - static_cast<float>(static_cast<std::int32_t>(sixths + 0.5F)));
   // A frequency that is announced while the current stands is no turning.
-  const bool turning = std::fabs(state_.swept_rad) > 0.5F &&
-                       std::fabs(state_.turned_rad) > 0.4F * std::min(std::fabs(state_.swept_rad), n);
+  const bool turning =
+      std::fabs(state_.swept_rad) > 0.5F &&
+      std::fabs(state_.turned_rad) > 0.4F * std::min(std::fabs(state_.swept_rad), n);
   const bool raw = zeros >= kZeroShare * n ||  // (E17)
                    (seven >= kSevenShare * n && off_step * n > kSpread_rad);
   State next{};

@@ -28,8 +28,8 @@ class RawPwmDetector {
 
   struct Input {
     MotorSample motor;
-    float angle_rad;   // swept at the stator frequency since the previous observation
-    float elapsed_s;   // likewise
+    float angle_rad;  // swept at the stator frequency since the previous observation
+    float elapsed_s;  // likewise
   };
 
   struct State {
@@ -42,7 +42,7 @@ class RawPwmDetector {
     std::uint32_t observations = 0;
     std::uint32_t zeros = 0;
     std::uint32_t corners = 0;
-    std::uint32_t suspicious = 0;     // windows in a row
+    std::uint32_t suspicious = 0;  // windows in a row
   };
 
   // True as long as the last two windows say "raw".

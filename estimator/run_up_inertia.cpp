@@ -5,8 +5,8 @@
 namespace cutforce::estimator {
 namespace {
 
-constexpr float kTorqueError_ratio = 0.01F;     // of the run-up's torque: resistance, offsets
-constexpr float kTareError_ratio = 0.002F;      // of rated: friction differs while speeding up
+constexpr float kTorqueError_ratio = 0.01F;          // of the run-up's torque: resistance, offsets
+constexpr float kTareError_ratio = 0.002F;           // of rated: friction differs while speeding up
 constexpr float kSmallestAcceleration_ratio = 0.1F;  // of rated, mean over the run-up
 constexpr float kFarthest_sigmas = 2.0F;
 
@@ -17,8 +17,7 @@ RunUpInertia::RunUpInertia(const Config& config) noexcept : config_(config) {
   state_.sigma_ratio = config.inertia_sigma_ratio;
 }
 
-auto RunUpInertia::make(const Config& config) noexcept
-    -> std::expected<RunUpInertia, ConfigError> {
+auto RunUpInertia::make(const Config& config) noexcept -> std::expected<RunUpInertia, ConfigError> {
   if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
   return RunUpInertia{config};
 }
@@ -56,7 +55,8 @@ void RunUpInertia::close(float tare_nm) noexcept {
   if (!(gained > smallest && gained > 0.0F && s.time_s > 0.0F)) return;
   const float seen = (s.impulse_nm_s - tare_nm * s.time_s) / s.gained_rad_s;  // (E115)
   const float from_tare = kTareError_ratio * config_.rated_torque_nm * s.time_s / gained;
-  const float sigma = std::sqrt(kTorqueError_ratio * seen * kTorqueError_ratio * seen + from_tare * from_tare);
+  const float sigma =
+      std::sqrt(kTorqueError_ratio * seen * kTorqueError_ratio * seen + from_tare * from_tare);
   const float prior = config_.inertia_sigma_ratio * config_.inertia_kg_m2;
   const float off = seen - config_.inertia_kg_m2;
   if (!(off < kFarthest_sigmas * prior && off > -kFarthest_sigmas * prior)) return;

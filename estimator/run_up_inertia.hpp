@@ -19,7 +19,7 @@ class RunUpInertia {
 
   struct Config {
     float inertia_kg_m2;
-    float inertia_sigma_ratio;   // of the value given
+    float inertia_sigma_ratio;  // of the value given
     float coulomb_torque_nm;
     float viscous_nm_s_rad;
     float rated_torque_nm;
@@ -34,11 +34,11 @@ class RunUpInertia {
   };
 
   struct Input {
-    float torque_nm;     // mean of the tick
-    float speed_rad_s;   // end of the tick, filtered
+    float torque_nm;    // mean of the tick
+    float speed_rad_s;  // end of the tick, filtered
     float duration_s;
-    bool valid;          // torque and speed can be told
-    bool tared;          // a tare is known: close
+    bool valid;  // torque and speed can be told
+    bool tared;  // a tare is known: close
     float tare_nm;
   };
 

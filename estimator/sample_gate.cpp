@@ -114,8 +114,8 @@ auto SampleGate::refused(FaultSet faults) const noexcept -> Output {
 void SampleGate::pass_time(const Input& input, Output& output) const noexcept {  // (E10)
   // Unsigned, because the difference of two far times would overflow; after a clock that was set
   // back it is huge, and so a gap.
-  const std::uint64_t since = static_cast<std::uint64_t>(input.time_ns) -
-                              static_cast<std::uint64_t>(state_.last_time_ns);
+  const std::uint64_t since =
+      static_cast<std::uint64_t>(input.time_ns) - static_cast<std::uint64_t>(state_.last_time_ns);
   if (since - static_cast<std::uint64_t>(limits_.period_ns - limits_.tolerance_ns) <=
       static_cast<std::uint64_t>(2 * limits_.tolerance_ns))
     return;
@@ -144,8 +144,8 @@ void SampleGate::pass_channels(const Input& input, Output& output, Values& value
     state_.bridged = 0;
     return;
   }
-  const bool bridges = state_.started != 0 && output.verdict == Verdict::kAccept &&
-                       state_.bridged < limits_.bridge;
+  const bool bridges =
+      state_.started != 0 && output.verdict == Verdict::kAccept && state_.bridged < limits_.bridge;
   if (bridges) {
     output.verdict = Verdict::kBridge;
     ++state_.bridged;

@@ -13,10 +13,11 @@
 // A channel at the end of its range is let through and reported; whether it is clipped is told by
 // SignalHealth.
 //
-// Cost of a usual sample: 6 multiplications, 4 additions and 2 comparisons for six channels, because
-// |x|^2 summed over three channels below (0.998 limit)^2 clears all three at once (E9); one 64-bit
-// subtraction and comparison for the time; one comparison each for speed and power; a copy of eight
-// values. At -O2 that is 89 instructions for a Cortex-M7 as a function of its own, 66 on x86-64.
+// Cost of a usual sample: 6 multiplications, 4 additions and 2 comparisons for six channels,
+// because |x|^2 summed over three channels below (0.998 limit)^2 clears all three at once (E9); one
+// 64-bit subtraction and comparison for the time; one comparison each for speed and power; a copy
+// of eight values. At -O2 that is 89 instructions for a Cortex-M7 as a function of its own, 66 on
+// x86-64.
 #pragma once
 
 #include <array>
@@ -33,13 +34,13 @@ class SampleGate {
   enum class ConfigError : std::uint8_t { kPeriod, kLimit, kGapLimit, kBridgeLimit, kClockLimit };
 
   struct Config {
-    float sample_period_s;      // nominal
-    float voltage_limit_v;      // end of the sensor's range, in magnitude; likewise below
+    float sample_period_s;  // nominal
+    float voltage_limit_v;  // end of the sensor's range, in magnitude; likewise below
     float current_limit_a;
     float speed_limit_rad_s;
     float power_limit_w;
-    float gap_limit_s;          // at most 2 s
-    std::uint32_t bridge_limit; // bad samples in a row that are bridged; 0: none
+    float gap_limit_s;           // at most 2 s
+    std::uint32_t bridge_limit;  // bad samples in a row that are bridged; 0: none
     // A clock that was set back: so many samples in a row that lie before the last one, at
     // different times, begin a new time. 0: never.
     std::uint32_t clock_limit;
@@ -87,13 +88,13 @@ class SampleGate {
     std::int64_t last_time_ns = 0;
     std::int64_t rejected_time_ns = 0;  // of the latest sample from before last_time_ns
     Values last_good{};
-    std::uint32_t last_present = 0;     // what last_good holds of speed and power
+    std::uint32_t last_present = 0;  // what last_good holds of speed and power
     std::uint32_t started = 0;
-    std::uint32_t bridged = 0;          // in a row
+    std::uint32_t bridged = 0;  // in a row
     std::uint32_t speed_bridged = 0;
     std::uint32_t power_bridged = 0;
-    std::uint32_t set_back = 0;         // samples in a row from before last_time_ns
-    std::uint32_t unusual = 1;          // 0: started, and none of the counts above is running
+    std::uint32_t set_back = 0;  // samples in a row from before last_time_ns
+    std::uint32_t unusual = 1;   // 0: started, and none of the counts above is running
   };
 
   [[nodiscard]] static std::expected<SampleGate, ConfigError> make(const Config& config) noexcept;
@@ -101,7 +102,8 @@ class SampleGate {
   // A usual sample at its usual time after another is dealt with here, all else elsewhere; what
   // comes out is the same.
   [[nodiscard]] Output step(const Input& input) noexcept {
-    if (!usual(input)) [[unlikely]] return step_carefully(input);
+    if (!usual(input)) [[unlikely]]
+      return step_carefully(input);
     state_.last_good = input.values;
     state_.last_present = input.present;
     state_.last_time_ns = input.time_ns;
@@ -127,7 +129,7 @@ class SampleGate {
     float periods_per_ns;
     float voltage_v;
     float current_a;
-    float voltage_end_v;       // from here on a channel counts as at its end
+    float voltage_end_v;  // from here on a channel counts as at its end
     float current_end_a;
     float speed_rad_s;
     float power_w;
@@ -141,9 +143,10 @@ class SampleGate {
     return x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
   }
   [[nodiscard]] bool usual(const Input& input) const noexcept {  // (E9), (E10)
-    const std::uint64_t early = static_cast<std::uint64_t>(input.time_ns) -
-                                static_cast<std::uint64_t>(state_.last_time_ns) -
-                                static_cast<std::uint64_t>(limits_.period_ns - limits_.tolerance_ns);
+    const std::uint64_t early =
+        static_cast<std::uint64_t>(input.time_ns) -
+        static_cast<std::uint64_t>(state_.last_time_ns) -
+        static_cast<std::uint64_t>(limits_.period_ns - limits_.tolerance_ns);
     const Values& v = input.values;
     return state_.unusual == 0 && early <= static_cast<std::uint64_t>(2 * limits_.tolerance_ns) &&
            square(v.voltage_v) < limits_.voltage_end_v * limits_.voltage_end_v &&

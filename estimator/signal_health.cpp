@@ -34,15 +34,14 @@ auto SignalHealth::step(const Input& input) noexcept -> Output {
   if (state_.is_picked != 0) {
     const Observation& o = state_.picked;
     const float elapsed_s = o.elapsed_periods * config_.sample_period_s;
-    const Tick tick{
-        .frequency_rad_s = input.frequency_rad_s,
-        .period_s = turning ? kTurn / magnitude : 0.0F,
-        .elapsed_s = elapsed_s,
-        .sample = {.channel = {o.voltage_v[0], o.voltage_v[1], o.voltage_v[2], o.current_a[0],
-                               o.current_a[1], o.current_a[2]},
-                   .motor = o.motor,
-                   .current_residual_a = o.current_residual_a,
-                   .angle_rad = turning ? input.frequency_rad_s * elapsed_s : 0.0F}};
+    const Tick tick{.frequency_rad_s = input.frequency_rad_s,
+                    .period_s = turning ? kTurn / magnitude : 0.0F,
+                    .elapsed_s = elapsed_s,
+                    .sample = {.channel = {o.voltage_v[0], o.voltage_v[1], o.voltage_v[2],
+                                           o.current_a[0], o.current_a[1], o.current_a[2]},
+                               .motor = o.motor,
+                               .current_residual_a = o.current_residual_a,
+                               .angle_rad = turning ? input.frequency_rad_s * elapsed_s : 0.0F}};
     judge_channels(tick);
     judge_rotation(tick);
   }

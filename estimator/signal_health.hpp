@@ -6,24 +6,27 @@
 //                  observations while the others of its kind move; speed: for 0.5 s while the
 //                  frequency changes by 20 %
 //   lost_phase     a channel whose fundamental and mean are below 1/4 of the largest of its kind
-//   phase_order    at steady frequency, for 0.3 s: voltage and current turn in opposite senses, or a
+//   phase_order    at steady frequency, for 0.3 s: voltage and current turn in opposite senses, or
+//   a
 //                  negative sequence or a residual above 1/3 of the positive sequence; for 1 s:
 //                  reactive power below -0.1 S (an induction machine always takes some) or active
 //                  power below -0.2 S (braking changes the speed)
-//   raw_pwm        see raw_pwm.hpp; or for 0.15 s a voltage below 5 % of what rated flux induces; or
+//   raw_pwm        see raw_pwm.hpp; or for 0.15 s a voltage below 5 % of what rated flux induces;
+//   or
 //                  for 1.5 s at steady frequency the flux |v - R_s i|/w_e outside 0.3 to 1.5 of its
 //                  rated value
-//   clipped        within one electrical period in two ticks at the end of the range, or a current twice
+//   clipped        within one electrical period in two ticks at the end of the range, or a current
+//   twice
 //                  flat for more than T_e/12 (voltages may be: a line voltage in overmodulation is)
 //
-// Nothing that needs rotation is judged below `minimum_frequency_rad_s`, with the frequency unknown,
-// or while the current does not turn at it. A fault stays for `hold_s` after it was last seen;
-// raw_pwm stays until restart().
+// Nothing that needs rotation is judged below `minimum_frequency_rad_s`, with the frequency
+// unknown, or while the current does not turn at it. A fault stays for `hold_s` after it was last
+// seen; raw_pwm stays until restart().
 //
 // One sample of each tick is looked at, at a place that moves by one sample from tick to tick, so
 // that no carrier is in step with it. Cost of the other samples: 1 addition, 1 decrement, 1 branch.
-// A tick costs, by reading and not by measurement, about 150 operations, 2 divisions; at the end of an electrical period about 100 more
-// with 12 square roots.
+// A tick costs, by reading and not by measurement, about 150 operations, 2 divisions; at the end of
+// an electrical period about 100 more with 12 square roots.
 #pragma once
 
 #include <array>
@@ -51,22 +54,28 @@ class SignalHealth {
   static constexpr std::size_t kChannels = PeriodPhasors::kChannels;
 
   enum class ConfigError : std::uint8_t {
-    kPeriod, kChannels, kRange, kFloor, kFrequency, kRating, kHold
+    kPeriod,
+    kChannels,
+    kRange,
+    kFloor,
+    kFrequency,
+    kRating,
+    kHold
   };
 
   struct Config {
     float sample_period_s;
-    float tick_period_s;               // at least the sample period
-    std::uint32_t voltage_channels;    // 2 or 3
-    std::uint32_t current_channels;    // 2 or 3
-    float voltage_range_v;             // end of the range of a raw channel
+    float tick_period_s;             // at least the sample period
+    std::uint32_t voltage_channels;  // 2 or 3
+    std::uint32_t current_channels;  // 2 or 3
+    float voltage_range_v;           // end of the range of a raw channel
     float current_range_a;
-    float voltage_floor_v;             // peak below which a channel's kind is not judged; at least
-    float current_floor_a;             // ten steps of the converter
-    float minimum_frequency_rad_s;     // electrical
-    float rated_frequency_rad_s;       // electrical; 0: unknown
-    float rated_flux_v_s;              // peak, star-equivalent; 0: unknown, then no flux test
-    float stator_resistance_ohm;       // star-equivalent
+    float voltage_floor_v;          // peak below which a channel's kind is not judged; at least
+    float current_floor_a;          // ten steps of the converter
+    float minimum_frequency_rad_s;  // electrical
+    float rated_frequency_rad_s;    // electrical; 0: unknown
+    float rated_flux_v_s;           // peak, star-equivalent; 0: unknown, then no flux test
+    float stator_resistance_ohm;    // star-equivalent
     float hold_s;
 
     // kPeriod: not 1 us <= sample <= tick <= 0.1 s; kChannels: neither 2 nor 3; kRange, kFrequency:
@@ -81,8 +90,8 @@ class SignalHealth {
     std::array<float, 3> current_a;
     MotorSample motor;
     float current_residual_a;
-    float elapsed_periods;           // as the gate says
-    std::uint32_t at_end_channels;   // likewise
+    float elapsed_periods;          // as the gate says
+    std::uint32_t at_end_channels;  // likewise
   };
 
   struct Input {
@@ -108,11 +117,11 @@ class SignalHealth {
 
   struct State {
     std::array<Channel, kChannels> channel{};
-    Observation picked{};                 // this tick's observation
-    std::uint32_t at_end_channels = 0;    // of any sample since then
-    float elapsed_periods = 0.0F;         // since the previous tick's observation
-    std::int32_t countdown = 0;           // to the sample to pick
-    std::int32_t place = 0;               // of that sample in its tick
+    Observation picked{};               // this tick's observation
+    std::uint32_t at_end_channels = 0;  // of any sample since then
+    float elapsed_periods = 0.0F;       // since the previous tick's observation
+    std::int32_t countdown = 0;         // to the sample to pick
+    std::int32_t place = 0;             // of that sample in its tick
     std::uint32_t is_picked = 0;
     std::array<float, kFaultCount> left_s{};  // of the hold
     std::uint32_t raw_latched = 0;
@@ -129,7 +138,7 @@ class SignalHealth {
     float steady_frequency_rad_s = 0.0F;  // from which the frequency has not moved by 3 %
     float speed_held_rad_s = 0.0F;
     float speed_same_s = 0.0F;
-    float speed_frequency_rad_s = 0.0F;   // when it last changed
+    float speed_frequency_rad_s = 0.0F;  // when it last changed
   };
 
   [[nodiscard]] static std::expected<SignalHealth, ConfigError> make(const Config& config) noexcept;
@@ -158,8 +167,8 @@ class SignalHealth {
  private:
   struct Tick {
     float frequency_rad_s;
-    float period_s;    // electrical; 0: not turning
-    float elapsed_s;   // between this tick's observation and the one before
+    float period_s;   // electrical; 0: not turning
+    float elapsed_s;  // between this tick's observation and the one before
     PeriodPhasors::Input sample;
   };
 

@@ -8,19 +8,19 @@
 namespace cutforce::estimator {
 namespace {
 
-constexpr float kCoherent = 0.5F;       // share of |i|^2 that must turn at the frequency
-constexpr float kLostShare = 0.25F;     // (E14)
+constexpr float kCoherent = 0.5F;           // share of |i|^2 that must turn at the frequency
+constexpr float kLostShare = 0.25F;         // (E14)
 constexpr float kMinorShare = 1.0F / 3.0F;  // (E15)
 constexpr float kOrderPatience_s = 0.3F;
-// A real drive's recording shows its speed 0.9 s behind its voltages after a step: what rests on the
-// frequency's value and not only on its sense waits for longer than that.
+// A real drive's recording shows its speed 0.9 s behind its voltages after a step: what rests on
+// the frequency's value and not only on its sense waits for longer than that.
 constexpr float kPowerPatience_s = 1.0F;
-constexpr float kSteady = 0.03F;        // change of the frequency within which it counts as steady
+constexpr float kSteady = 0.03F;  // change of the frequency within which it counts as steady
 constexpr float kFluxPatience_s = 1.5F;
 constexpr float kVanishedPatience_s = 0.15F;
-constexpr float kFluxFrom = 0.15F;      // of rated frequency
-constexpr float kFluxLeast = 0.3F;      // of rated flux
-constexpr float kVanished = 0.05F;      // of the voltage that rated flux induces
+constexpr float kFluxFrom = 0.15F;  // of rated frequency
+constexpr float kFluxLeast = 0.3F;  // of rated flux
+constexpr float kVanished = 0.05F;  // of the voltage that rated flux induces
 constexpr float kFluxMost = 1.5F;
 
 float size(SpaceVector x) noexcept { return std::sqrt(dot(x, x)); }
@@ -136,17 +136,18 @@ void SignalHealth::judge_order(float frequency_rad_s,
     return;
   }
   // (E15); whichever way it turns, the machine takes reactive power however it is loaded.
-  const float reactive = frequency_rad_s < 0.0F ? -cross(v.major, i.major) : cross(v.major, i.major);
+  const float reactive =
+      frequency_rad_s < 0.0F ? -cross(v.major, i.major) : cross(v.major, i.major);
   const float apparent = v_size * i_size;
   const bool wrong = v.with_frequency != i.with_frequency || v.minor > kMinorShare * v_size ||
                      i.minor > kMinorShare * i_size ||
                      result.residual_a > 3.0F * kMinorShare * i_size;
   state_.order_s = wrong ? state_.order_s + state_.window_s : 0.0F;
   // Two windows at least: one that holds a step of the load is no sine.
-  if (state_.order_s >= std::max(kOrderPatience_s, 1.9F * state_.window_s)) raise(Fault::kPhaseOrder);
+  if (state_.order_s >= std::max(kOrderPatience_s, 1.9F * state_.window_s))
+    raise(Fault::kPhaseOrder);
 
-  const bool reverse =
-      dot(v.major, i.major) < -0.2F * apparent || reactive < -0.1F * apparent;
+  const bool reverse = dot(v.major, i.major) < -0.2F * apparent || reactive < -0.1F * apparent;
   state_.reverse_s = reverse ? state_.reverse_s + state_.window_s : 0.0F;
   if (state_.reverse_s >= kPowerPatience_s) raise(Fault::kPhaseOrder);
 }

@@ -20,7 +20,7 @@ class SpeedRipple {
     std::array<float, 4> amplitude_rad_s{};  // a_1, b_1, a_2, b_2
     float cosine = 1.0F;                     // of theta
     float sine = 0.0F;
-    float rest_variance = 0.0F;              // of what was learned from
+    float rest_variance = 0.0F;  // of what was learned from
     float learned_s = 0.0F;
     float last_gain = 1.0F;
   };
@@ -62,7 +62,8 @@ class SpeedRipple {
   [[nodiscard]] constexpr bool applies() const noexcept {
     float power = 0.0F;
     for (const float a : state_.amplitude_rad_s) power += a * a;
-    return state_.learned_s > kTime_s && power > kStandsOut_ratio * state_.last_gain * state_.rest_variance;
+    return state_.learned_s > kTime_s &&
+           power > kStandsOut_ratio * state_.last_gain * state_.rest_variance;
   }
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }

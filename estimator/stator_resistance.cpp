@@ -6,11 +6,16 @@ namespace cutforce::estimator {
 namespace {
 
 constexpr float kBlock_s = 0.05F;
-constexpr float kModelError_ratio = 0.006F;  // of flux, slip and torque together; does not average out
-constexpr float kModelCount = 20.0F;         // blocks that share that error
-constexpr float kSlipNoise_rad_s = 0.02F;    // of a block's mean
-constexpr float kSteady_ratio = 0.02F;       // torque may move by this much of rated within a block
-constexpr float kLargestChange_ratio = 0.5F;
+constexpr float kModelError_ratio =
+    0.006F;                           // of flux, slip and torque together; does not average out
+constexpr float kModelCount = 20.0F;  // blocks that share that error
+constexpr float kSlipNoise_rad_s = 0.02F;  // of a block's mean
+constexpr float kSteady_ratio = 0.02F;     // torque may move by this much of rated within a block
+constexpr float kScatterShare = 0.2F;
+constexpr float kScatterCount = 4.0F;  // slow noise: blocks are not independent
+constexpr float kStandsOut_sigmas = 3.0F;
+constexpr float kLargestRise_ratio = 1.0F;  // of the resistance in use
+constexpr float kLargestFall_ratio = 0.5F;
 
 }  // namespace
 
@@ -19,7 +24,7 @@ StatorResistance::StatorResistance(const Config& config) noexcept : config_(conf
   const float sa = config.rotor_sigma_ratio * a;
   const float sr = a * config.resistance_sigma_ratio * config.stator_resistance_ohm;
   const float sf = a * config.iron_torque_sigma_nm;
-  state_.mean = {a, 0.0F, 0.0F};
+  state_.mean = {a, 0.0F, a * config.iron_torque_nm};
   state_.covariance = {sa * sa, 0.0F, 0.0F, sr * sr, 0.0F, sf * sf};
 }
 
@@ -35,17 +40,20 @@ void StatorResistance::step(const Input& in) noexcept {
   const float limit = kSteady_ratio * config_.rated_torque_nm;
   if (!in.steady || moved > limit || moved < -limit) {
     s.fill(0.0F);
+    state_.blocks = 0;
     state_.first_torque_nm = in.torque_nm;
     if (!in.steady) return;
   }
   const float w = in.frequency_rad_s;
-  const float x = 1.5F * in.current_squared_a2 * config_.pole_pairs / (w > 1.0F || w < -1.0F ? w : 1.0F);
+  const float x =
+      1.5F * in.current_squared_a2 * config_.pole_pairs / (w > 1.0F || w < -1.0F ? w : 1.0F);
   s[0] += in.flux_squared * in.duration_s;
   s[1] += (in.flux_frequency_rad_s - config_.pole_pairs * in.speed_rad_s) * in.duration_s;
   s[2] += in.torque_nm * in.duration_s;
   s[3] += x * in.duration_s;
-  s[4] += in.duration_s;
-  if (s[4] >= kBlock_s) {
+  s[4] += (w < 0.0F ? -w : w) * in.duration_s;
+  s[5] += in.duration_s;
+  if (s[5] >= kBlock_s) {
     learn();
     s.fill(0.0F);
     state_.first_torque_nm = in.torque_nm;
@@ -54,19 +62,31 @@ void StatorResistance::step(const Input& in) noexcept {
 
 void StatorResistance::learn() noexcept {
   const auto& s = state_.sums;
-  const float torque = s[2] / s[4];
-  const float x = s[3] / s[4];
+  const float torque = s[2] / s[5];
+  const float x = s[3] / s[5];
+  const float speed_ratio = s[4] / s[5] / config_.rated_frequency_rad_s;
   // The copper term must stand out of what the iron loss may be.
   const float copper = config_.resistance_sigma_ratio * config_.stator_resistance_ohm * x;
-  if (!(copper > config_.iron_torque_sigma_nm)) return;
+  const float magnitude = copper < 0.0F ? -copper : copper;
+  if (!(magnitude > kStandsOut_sigmas * config_.iron_torque_sigma_nm * speed_ratio)) return;
 
-  const float flux2 = s[0] / s[4];
-  const float y = flux2 * s[1] / s[4];
+  const float flux2 = s[0] / s[5];
+  const float y = flux2 * s[1] / s[5];
   const float a = state_.mean[0];
   const float slip_noise = flux2 * kSlipNoise_rad_s;
   const float model = kModelError_ratio * a * (torque < 0.0F ? -torque : torque);
-  const float noise = slip_noise * slip_noise + kModelCount * model * model;
-  const std::array<float, 3> h{torque, -x, -1.0F};  // (E110)
+  const std::array<float, 3> h{torque, -x, -speed_ratio};  // (E110)
+  const float r = y - (h[0] * state_.mean[0] + h[1] * state_.mean[1] + h[2] * state_.mean[2]);
+  if (state_.blocks++ == 0) {
+    // The first block after a change may hold some of it: it only starts the comparison.
+    state_.last_rest = r;
+    return;
+  }
+  const float change = r - state_.last_rest;
+  state_.last_rest = r;
+  state_.scatter += kScatterShare * (0.5F * change * change - state_.scatter);
+  const float noise =
+      slip_noise * slip_noise + kScatterCount * state_.scatter + kModelCount * model * model;
 
   auto& [p00, p01, p02, p11, p12, p22] = state_.covariance;
   const float g0 = p00 * h[0] + p01 * h[1] + p02 * h[2];
@@ -74,7 +94,6 @@ void StatorResistance::learn() noexcept {
   const float g2 = p02 * h[0] + p12 * h[1] + p22 * h[2];
   const float variance = h[0] * g0 + h[1] * g1 + h[2] * g2 + noise;
   if (!(variance > 0.0F)) return;
-  const float r = y - (h[0] * state_.mean[0] + h[1] * state_.mean[1] + h[2] * state_.mean[2]);
   const float scale = 1.0F / variance;
   state_.mean[0] += g0 * scale * r;
   state_.mean[1] += g1 * scale * r;
@@ -92,10 +111,11 @@ void StatorResistance::learn() noexcept {
 
 float StatorResistance::change_ohm() const noexcept {
   const float a = state_.mean[0];
-  const float limit = kLargestChange_ratio * config_.stator_resistance_ohm;
   if (!(a > 0.0F)) return 0.0F;
   const float change = state_.mean[1] / a;
-  return change > limit ? limit : (change < -limit ? -limit : change);
+  const float most = kLargestRise_ratio * config_.stator_resistance_ohm;
+  const float least = -kLargestFall_ratio * config_.stator_resistance_ohm;
+  return change > most ? most : (change < least ? least : change);
 }
 
 float StatorResistance::change_sigma_ohm() const noexcept {

@@ -1,11 +1,12 @@
 // Stator resistance on line, from the consistency of slip and torque.
 //
-//   |psi_R|^2 w_sl = A T - (A dR) x - A T_fe,   x = 1.5 |i|^2 p / w_e,  A = R_R / (1.5 p)   (E110)
+//   |psi_R|^2 w_sl = A T - (A dR) x - A T_fe |w_e|/w_n,   x = 1.5 |i|^2 p / w_e,
+//   A = R_R / (1.5 p)                                                                       (E110)
 // with w_sl = mean(w_psi) - p mean(w), T the torque computed with the resistance in use, dR the
-// true resistance less that, T_fe the torque of the iron loss. Means of 50 ms while torque and
-// speed stand still. Torque is the instrument, slip the measurement: slip is the noisy quantity.
-// Three states (A, A dR, A T_fe) in a Kalman filter without process noise but slow forgetting of
-// dR (temperature). The torque is corrected by
+// true resistance less that, T_fe the torque of the iron loss at rated frequency w_n. Means of 50
+// ms while torque and speed stand still. Torque is the instrument, slip the measurement: slip is
+// the noisy quantity. Three states (A, A dR, A T_fe) in a Kalman filter without process noise but
+// slow forgetting of dR (temperature). The torque is corrected by
 //   T' = T - dR (x - x_tare)                                                                (E111)
 // only, so that the tare keeps continuity. Where the copper term is smaller than what the iron
 // loss may be, the value found is kept and nothing is learned.
@@ -30,11 +31,13 @@ class StatorResistance {
     float rotor_resistance_ohm;
     float rotor_sigma_ratio;
     float rated_torque_nm;
-    float iron_torque_sigma_nm;   // small where the iron loss is declared
+    float rated_frequency_rad_s;
+    float iron_torque_nm;        // what is declared, at rated frequency
+    float iron_torque_sigma_nm;  // small where the iron loss is declared
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       if (!(pole_pairs >= 1.0F && stator_resistance_ohm > 0.0F && rotor_resistance_ohm > 0.0F &&
-            rated_torque_nm > 0.0F))
+            rated_torque_nm > 0.0F && rated_frequency_rad_s > 0.0F))
         return std::unexpected{ConfigError::kMotor};
       if (!(resistance_sigma_ratio > 0.0F && rotor_sigma_ratio > 0.0F &&
             iron_torque_sigma_nm > 0.0F))
@@ -44,10 +47,10 @@ class StatorResistance {
   };
 
   struct Input {
-    float flux_squared;           // |psi_R|^2 with the resistance in use
-    float flux_frequency_rad_s;   // of this tick
-    float speed_rad_s;            // measured, mechanical
-    float frequency_rad_s;        // smoothed w_e
+    float flux_squared;          // |psi_R|^2 with the resistance in use
+    float flux_frequency_rad_s;  // of this tick
+    float speed_rad_s;           // measured, mechanical
+    float frequency_rad_s;       // smoothed w_e
     float torque_nm;
     float current_squared_a2;
     float duration_s;
@@ -57,15 +60,18 @@ class StatorResistance {
   struct State {
     std::array<float, 3> mean{};
     std::array<float, 6> covariance{};  // 00 01 02 11 12 22
-    std::array<float, 5> sums{};        // flux2, slip, torque, x, time
+    std::array<float, 6> sums{};        // flux2, slip, torque, x, |w_e|, time
     float first_torque_nm = 0.0F;
+    float last_rest = 0.0F;    // what the block before left unexplained
+    float scatter = 0.0F;      // variance of a block, from the changes of that
+    std::uint32_t blocks = 0;  // in a row
   };
 
   [[nodiscard]] static std::expected<StatorResistance, ConfigError> make(
       const Config& config) noexcept;
   void step(const Input& input) noexcept;
 
-  [[nodiscard]] float change_ohm() const noexcept;        // dR, within +-50 %
+  [[nodiscard]] float change_ohm() const noexcept;  // dR, within -50 and +100 %
   [[nodiscard]] float change_sigma_ohm() const noexcept;
 
   [[nodiscard]] const State& state() const noexcept { return state_; }

@@ -11,7 +11,7 @@
 namespace cutforce::firmware {
 
 enum class ConfigurationError : std::uint8_t {
-  kSampleRate,      // not known: neither the machine nor the recording says it
+  kSampleRate,  // not known: neither the machine nor the recording says it
   kPolePairs,
   kRating,          // rated power or torque missing
   kEstimatePeriod,  // not a whole number of sample periods
@@ -23,6 +23,9 @@ struct ConfigurationFailure {
   ConfigurationError error;
   ControlLoop::ConfigError block;  // for kBlock
 };
+
+[[nodiscard]] std::expected<ControlLoop::Config, ConfigurationError> make_loop_config(
+    const Machine& machine) noexcept;
 
 // `machine` must be complete (complete_from_rating) and pass check(Machine).
 [[nodiscard]] std::expected<ControlLoop, ConfigurationFailure> make_loop(

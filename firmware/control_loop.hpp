@@ -48,13 +48,15 @@ class ControlLoop {
 
   struct Config {
     EstimatorName estimator;
-    bool control;                       // false: no controller, the override stays neutral
+    bool control;  // false: no controller, the override stays neutral
     bool current_w_present;
     std::uint32_t samples_per_estimate;
     std::uint32_t estimates_per_control;
-    float fixed_diameter_m;             // used where the samples bring none; 0: not known
+    float fixed_diameter_m;  // used where the samples bring none; 0: not known
     float dynamometer_sigma_n;
-    bool feed_signal;                   // believe feed_active where it is present
+    float rated_torque_nm;
+    float voltage_lead_s;
+    float force_minimum_speed_rad_s;
     estimator::SampleGate::Config gate;
     estimator::FrontEnd::Config front_end;
     estimator::SignalHealth::Config health;
@@ -69,22 +71,31 @@ class ControlLoop {
   // What the loop itself keeps between samples.
   struct Own {
     std::int64_t time_ns = 0;
-    float elapsed_periods = 0.0F;       // in the estimate window so far
-    float control_periods = 0.0F;       // estimate windows in the control period so far
-    float calibrated_s = 0.0F;          // of idle calibration so far
+    float elapsed_periods = 0.0F;  // in the estimate window so far
+    std::uint32_t estimates = 0;   // in the control period so far
+    float turning_s = 0.0F;        // with sound signals, saturating
+    float frequency_rad_s = 0.0F;  // electrical, of the last tick
+    float speed_rad_s = 0.0F;      // as measured
+    float shaft_rad_s = 0.0F;      // as estimated
+    std::uint32_t speed_present = 0;
+    float meter_w = 0.0F;
+    std::uint32_t meter_present = 0;
+    std::uint32_t force_due = 0;  // estimates in the control period that had no force
+    float calibrated_s = 0.0F;    // of idle calibration so far
     float diameter_m = 0.0F;
-    float force_n = 0.0F;               // mean over the control period so far
+    float force_n = 0.0F;  // mean over the control period so far
     float force_sigma_n = 0.0F;
     std::uint32_t force_count = 0;
     float dynamometer_n = 0.0F;
     std::uint32_t dynamometer_count = 0;
-    estimator::FaultSet faults{};       // since the last output
-    std::uint32_t feed = 0;             // 0 unknown, 1 idle, 2 active
-    std::uint32_t refused = 0;          // the signals cannot carry an estimate
+    estimator::FaultSet faults{};  // since the last output
+    std::uint32_t feed = 0;        // 0 unknown, 1 idle, 2 active
     std::uint32_t enabled = 1;
     std::uint32_t override_reported = 0;
     float override_reported_pct = 0.0F;
     estimator::Calibration calibration{};
+    estimator::TorquePath::Output path{};
+    std::uint32_t has_path = 0;
     LoopOutput last{};
   };
 
@@ -97,6 +108,7 @@ class ControlLoop {
     estimator::TorquePath::State path;
     control::ControlPath::State controller;
     Own own;
+    hal::Command command;
   };
 
   [[nodiscard]] static std::expected<ControlLoop, ConfigError> make(const Config& config) noexcept;
@@ -113,18 +125,16 @@ class ControlLoop {
  private:
   explicit ControlLoop(const Config& config) noexcept;
 
-  struct Estimate {
-    LoopOutput output;
-    float speed_rad_s;
-    bool torque_valid;
-  };
   void restart() noexcept;
   void note_commands(const hal::Sample& sample) noexcept;
   void calibrate(const estimator::FusedObserver::Output& fused) noexcept;
+  void apply_calibration(const estimator::IdleCalibration::Result& result) noexcept;
+  void watch_health(LoopOutput& out) noexcept;
   [[nodiscard]] LoopOutput close_estimate() noexcept;
   void estimate_fused(LoopOutput& out) noexcept;
-  void publish_path(const estimator::TorquePath::Output& path) noexcept;
-  void add_force(float speed_rad_s, LoopOutput& out) noexcept;
+  void estimate_path(LoopOutput& out) const noexcept;
+  void estimate_dynamometer(LoopOutput& out) noexcept;
+  void add_force(LoopOutput& out) noexcept;
   void control_tick(LoopOutput& out) noexcept;
 
   Config config_;

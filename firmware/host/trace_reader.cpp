@@ -132,7 +132,8 @@ std::optional<InputError> TraceReader::read_cell(const TraceColumn& column, std:
       output.time_ns = last_time_ns_ = time.value;
       return std::nullopt;
     }
-    case TraceRole::kNumber: return read_number_cell(column, cell, output);
+    case TraceRole::kNumber:
+      return read_number_cell(column, cell, output);
     case TraceRole::kSource: {
       const auto index = index_of(cell, kSourceNames);
       if (!index) return wrong(column, cell, "is no source");

@@ -63,7 +63,9 @@ auto TraceWriter::create(const std::filesystem::path& path)
 auto TraceWriter::write(const LoopOutput& output) -> std::expected<void, InputError> {
   for (const TraceColumn& column : kTraceColumns) {
     switch (column.role) {
-      case TraceRole::kTime: rows_.time(output.time_ns); break;
+      case TraceRole::kTime:
+        rows_.time(output.time_ns);
+        break;
       case TraceRole::kNumber:
         if ((output.present & column.present) != 0) {
           rows_.number(output.*column.number);
@@ -71,9 +73,15 @@ auto TraceWriter::write(const LoopOutput& output) -> std::expected<void, InputEr
           rows_.empty();
         }
         break;
-      case TraceRole::kSource: rows_.text(name_of(output.source, kSourceNames)); break;
-      case TraceRole::kState: rows_.text(name_of(output.state, kStateNames)); break;
-      case TraceRole::kFault: put_faults(rows_, output.faults); break;
+      case TraceRole::kSource:
+        rows_.text(name_of(output.source, kSourceNames));
+        break;
+      case TraceRole::kState:
+        rows_.text(name_of(output.state, kStateNames));
+        break;
+      case TraceRole::kFault:
+        put_faults(rows_, output.faults);
+        break;
     }
   }
   return rows_.end_row();

@@ -1,10 +1,11 @@
 // What a recording would have been with worse sensors, or with a worse machine file. Made on the
 // fly: one sample in, one sample out, the same every time for the same seed.
 //
-// 100 % of a current is its rated peak, sqrt(2) rated_current_a_rms; 100 % of a voltage is the rated
-// phase peak. The machine file has no rated voltage, so it follows from rated power and current
-// with a product of efficiency and power factor of 0.64, usual for 1 to 10 kW; where the rated
-// current is not given either, a 400 V net is assumed. That is good to 15 %, enough for a noise level.
+// 100 % of a current is its rated peak, sqrt(2) rated_current_a_rms; 100 % of a voltage is the
+// rated phase peak. The machine file has no rated voltage, so it follows from rated power and
+// current with a product of efficiency and power factor of 0.64, usual for 1 to 10 kW; where the
+// rated current is not given either, a 400 V net is assumed. That is good to 15 %, enough for a
+// noise level.
 #pragma once
 
 #include <array>
@@ -28,15 +29,15 @@ struct Condition {
   // Of the samples:
   float speed_noise_rad_s = 0.0F;  // standard deviation of white noise on each raw sample
   SpeedMade speed = SpeedMade::kAsRecorded;
-  int counts_per_turn = 0;         // of the encoder, after quadrature
+  int counts_per_turn = 0;  // of the encoder, after quadrature
   bool line_to_line = false;
   bool two_currents = false;
   std::array<float, 3> voltage_offset_pct{};
   std::array<float, 3> current_offset_pct{};
   std::array<float, 3> voltage_gain{1.0F, 1.0F, 1.0F};
   std::array<float, 3> current_gain{1.0F, 1.0F, 1.0F};
-  float noise_pct = 0.0F;          // of each voltage and current channel
-  int bits = 0;                    // of the converter; 0: no rounding
+  float noise_pct = 0.0F;  // of each voltage and current channel
+  int bits = 0;            // of the converter; 0: no rounding
   // Of the machine file:
   float stator_resistance_ratio = 1.0F;
   float inertia_ratio = 1.0F;

@@ -30,7 +30,9 @@ class Campaign {
  public:
   Campaign(const EvaluationOptions& options, const RunEstimator& run,
            const EvaluationProgress& progress, std::size_t recordings)
-      : options_(options), run_(run), progress_(progress),
+      : options_(options),
+        run_(run),
+        progress_(progress),
         conditions_(options.conditions.empty()
                         ? std::vector<Condition>(all_conditions().begin(), all_conditions().end())
                         : options.conditions),
@@ -98,11 +100,16 @@ class Campaign {
 
 std::string_view estimator_text(EstimatorName name) {
   switch (name) {
-    case EstimatorName::kMeasured: return "measured";
-    case EstimatorName::kComputed: return "computed";
-    case EstimatorName::kSynthesized: return "synthesized";
-    case EstimatorName::kFused: return "fused";
-    case EstimatorName::kDynamometer: return "dynamometer";
+    case EstimatorName::kMeasured:
+      return "measured";
+    case EstimatorName::kComputed:
+      return "computed";
+    case EstimatorName::kSynthesized:
+      return "synthesized";
+    case EstimatorName::kFused:
+      return "fused";
+    case EstimatorName::kDynamometer:
+      return "dynamometer";
   }
   return "unknown";
 }
@@ -128,8 +135,8 @@ RecordingTraits traits_of(const EvaluationRecording& recording) {
     }
   }
   const double rms = three == 0 ? 0.0 : std::sqrt(sum_square / static_cast<double>(three));
-  const double rated_rad_s = static_cast<double>(recording.machine.rated_power_w) /
-                             recording.truth.rated_torque_nm;
+  const double rated_rad_s =
+      static_cast<double>(recording.machine.rated_power_w) / recording.truth.rated_torque_nm;
   const double mean_rad_s = with_speed == 0 ? rated_rad_s : speed / static_cast<double>(with_speed);
   return {.sensor_errors = rms > static_cast<double>(kUnbalancedCurrents_ratio * peak),
           .pwm = recording.pwm,
@@ -156,10 +163,14 @@ Evaluation evaluate(const std::vector<std::filesystem::path>& recordings,
   Campaign campaign(options, run, progress, recordings.size());
   for (const auto& path : recordings) {
     const auto recording = open(path);
-    if (!recording) campaign.skip(path, recording.error().what);
-    else if (recording->truth.time_s.empty()) campaign.skip(path, "no column true_cutting_torque_nm");
-    else if (!(recording->truth.rated_torque_nm > 0.0)) campaign.skip(path, "no rated torque");
-    else campaign.evaluate(*recording);
+    if (!recording)
+      campaign.skip(path, recording.error().what);
+    else if (recording->truth.time_s.empty())
+      campaign.skip(path, "no column true_cutting_torque_nm");
+    else if (!(recording->truth.rated_torque_nm > 0.0))
+      campaign.skip(path, "no rated torque");
+    else
+      campaign.evaluate(*recording);
   }
   return campaign.finish();
 }

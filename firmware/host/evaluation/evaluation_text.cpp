@@ -52,9 +52,10 @@ std::string head(const Widths& widths, std::string_view last) {
 }
 
 std::string figures(const Metrics& m) {
-  return padded(number(m.steady_error_pct, 3), 10, true) + padded(number(m.noise_pct, 3), 10, true) +
-         padded(number(m.t50_ms, 1), 10, true) + padded(number(m.t90_ms, 1), 10, true) +
-         padded(number(m.overshoot_pct, 1), 10, true) + padded(number(m.coverage_pct, 1), 10, true) +
+  return padded(number(m.steady_error_pct, 3), 10, true) +
+         padded(number(m.noise_pct, 3), 10, true) + padded(number(m.t50_ms, 1), 10, true) +
+         padded(number(m.t90_ms, 1), 10, true) + padded(number(m.overshoot_pct, 1), 10, true) +
+         padded(number(m.coverage_pct, 1), 10, true) +
          padded(number(m.mean_sigma_pct, 2), 10, true) +
          padded(number(m.availability_pct, 1), 10, true);
 }
@@ -126,9 +127,11 @@ std::string worst_table(const Evaluation& evaluation, const Widths& widths) {
     if (std::find(seen.begin(), seen.end(), key) != seen.end()) continue;
     seen.push_back(key);
     const Worst worst = worst_of(evaluation, row);
-    std::string line = padded(row.condition == condition ? "" : row.condition, widths.condition, false) +
-                       "  " + padded(row.estimator, widths.estimator, false) + figures(worst.metrics);
-    if (worst.marked > 0) line += "  " + std::to_string(worst.met) + " of " + std::to_string(worst.marked);
+    std::string line =
+        padded(row.condition == condition ? "" : row.condition, widths.condition, false) + "  " +
+        padded(row.estimator, widths.estimator, false) + figures(worst.metrics);
+    if (worst.marked > 0)
+      line += "  " + std::to_string(worst.met) + " of " + std::to_string(worst.marked);
     text += line + "\n";
     condition = row.condition;
   }
@@ -146,13 +149,14 @@ std::string against_the_papers(const Evaluation& evaluation) {
       const auto& a = ours.metrics;
       const auto& b = theirs.metrics;
       if (!pair || !a.steady_error_pct || !b.steady_error_pct || !a.t50_ms || !b.t50_ms) continue;
-      text += "  " + ours.recording + ": " + theirs.estimator + " / fused = " +
-              number(*b.steady_error_pct / *a.steady_error_pct, 1) + " in steady error, " +
-              number(*b.t50_ms / *a.t50_ms, 1) + " in t50\n";
+      text += "  " + ours.recording + ": " + theirs.estimator +
+              " / fused = " + number(*b.steady_error_pct / *a.steady_error_pct, 1) +
+              " in steady error, " + number(*b.t50_ms / *a.t50_ms, 1) + " in t50\n";
     }
   }
   if (text.empty()) return text;
-  return "against the papers' methods, with 0.05 rad/s speed noise (goal: 10 and 4)\n" + text + "\n";
+  return "against the papers' methods, with 0.05 rad/s speed noise (goal: 10 and 4)\n" + text +
+         "\n";
 }
 
 std::string legend(const Evaluation& evaluation) {
@@ -169,7 +173,9 @@ std::string legend(const Evaluation& evaluation) {
   for (const auto& condition : all_conditions()) {
     const bool used = std::any_of(evaluation.rows.begin(), evaluation.rows.end(),
                                   [&](const auto& row) { return row.condition == condition.name; });
-    if (used) text += "  " + padded(std::string(condition.name), 22, false) + std::string(condition.description) + "\n";
+    if (used)
+      text += "  " + padded(std::string(condition.name), 22, false) +
+              std::string(condition.description) + "\n";
   }
   return text;
 }
@@ -181,29 +187,40 @@ Json json_number(const std::optional<double>& value) {
 }
 
 Json details(const Metrics& m) {
-  Json json{{"plateaus", Json::array()}, {"steps", Json::array()}, {"ramps", Json::array()},
+  Json json{{"plateaus", Json::array()},
+            {"steps", Json::array()},
+            {"ramps", Json::array()},
             {"tones", Json::array()}};
   for (const auto& p : m.plateaus)
-    json["plateaus"].push_back({{"from_s", p.from_s}, {"to_s", p.to_s}, {"level_pct", p.level_pct},
-                                {"error_pct", p.error_pct}, {"noise_pct", p.noise_pct}});
+    json["plateaus"].push_back({{"from_s", p.from_s},
+                                {"to_s", p.to_s},
+                                {"level_pct", p.level_pct},
+                                {"error_pct", p.error_pct},
+                                {"noise_pct", p.noise_pct}});
   for (const auto& s : m.steps)
-    json["steps"].push_back({{"from_s", s.from_s}, {"change_pct", s.change_pct},
-                             {"t50_ms", json_number(s.t50_ms)}, {"t90_ms", json_number(s.t90_ms)},
+    json["steps"].push_back({{"from_s", s.from_s},
+                             {"change_pct", s.change_pct},
+                             {"t50_ms", json_number(s.t50_ms)},
+                             {"t90_ms", json_number(s.t90_ms)},
                              {"overshoot_pct", s.overshoot_pct}});
   for (const auto& r : m.ramps)
-    json["ramps"].push_back({{"from_s", r.from_s}, {"slope_pct_s", r.slope_pct_s},
-                             {"lag_ms", r.lag_ms}, {"error_pct", r.error_pct}});
+    json["ramps"].push_back({{"from_s", r.from_s},
+                             {"slope_pct_s", r.slope_pct_s},
+                             {"lag_ms", r.lag_ms},
+                             {"error_pct", r.error_pct}});
   for (const auto& t : m.tones)
-    json["tones"].push_back({{"frequency_hz", t.frequency_hz}, {"amplitude_pct", t.amplitude_pct},
-                             {"gain_ratio", t.gain_ratio}, {"lag_ms", t.lag_ms},
+    json["tones"].push_back({{"frequency_hz", t.frequency_hz},
+                             {"amplitude_pct", t.amplitude_pct},
+                             {"gain_ratio", t.gain_ratio},
+                             {"lag_ms", t.lag_ms},
                              {"phase_deg", t.phase_deg}});
   return json;
 }
 
 Json json_row(const EvaluationRow& row) {
   const auto& m = row.metrics;
-  Json json{{"recording", row.recording}, {"condition", row.condition},
-            {"estimator", row.estimator}};
+  Json json{
+      {"recording", row.recording}, {"condition", row.condition}, {"estimator", row.estimator}};
   if (!row.error.empty()) {
     json["error"] = row.error;
     return json;

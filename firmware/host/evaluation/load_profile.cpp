@@ -54,8 +54,10 @@ std::vector<Plateau> find_plateaus(const Series& s, double range_nm) {
     while (low.front() < first) low.pop_front();
     const bool full = s.t[k] - s.t[first] > kWindow_s - 2.0 * kThinning_s;
     if (!full || s.x[high.front()] - s.x[low.front()] > range_nm) continue;
-    if (!found.empty() && s.t[first] <= found.back().to_s) found.back().to_s = s.t[k];
-    else found.push_back({.from_s = s.t[first], .to_s = s.t[k]});
+    if (!found.empty() && s.t[first] <= found.back().to_s)
+      found.back().to_s = s.t[k];
+    else
+      found.push_back({.from_s = s.t[first], .to_s = s.t[k]});
   }
   std::erase_if(found, [](const Plateau& p) { return p.to_s - p.from_s < kShortestPlateau_s; });
   return found;
@@ -106,14 +108,15 @@ class Sorter {
   // Sorts what lies between two plateaus, both ends included.
   void between(std::size_t first, std::size_t last) {
     if (last <= first) return;
-    const auto [low, high] = std::minmax_element(s_.x.begin() + static_cast<std::ptrdiff_t>(first),
-                                                 s_.x.begin() + static_cast<std::ptrdiff_t>(last) + 1);
+    const auto [low, high] =
+        std::minmax_element(s_.x.begin() + static_cast<std::ptrdiff_t>(first),
+                            s_.x.begin() + static_cast<std::ptrdiff_t>(last) + 1);
     const double hysteresis = std::max(kTurn_ratio * rated_nm_, kTurnOfSpan_ratio * (*high - *low));
     const auto turns = turning_points(s_, first, last, hysteresis);
     if (turns.size() >= kOscillationTurns + 2) {
-      for (const Tone& tone : find_tones(std::span(s_.t).subspan(first, last - first + 1),
-                                         std::span(s_.x).subspan(first, last - first + 1),
-                                         kTurn_ratio * rated_nm_))
+      for (const Tone& tone :
+           find_tones(std::span(s_.t).subspan(first, last - first + 1),
+                      std::span(s_.x).subspan(first, last - first + 1), kTurn_ratio * rated_nm_))
         profile_.tones.push_back(tone);
       return;
     }
@@ -184,10 +187,10 @@ LoadProfile find_load_profile(const TruthSeries& truth) {
 
   profile.scored_from_s = s.t.front();
   profile.scored_to_s = s.t.back();
-  const bool idle_first =
-      !profile.plateaus.empty() && profile.plateaus.front().from_s - s.t.front() < kWindow_s &&
-      std::abs(interpolate(s.t, s.x, profile.plateaus.front().from_s)) <
-          kIdle_ratio * truth.rated_torque_nm;
+  const bool idle_first = !profile.plateaus.empty() &&
+                          profile.plateaus.front().from_s - s.t.front() < kWindow_s &&
+                          std::abs(interpolate(s.t, s.x, profile.plateaus.front().from_s)) <
+                              kIdle_ratio * truth.rated_torque_nm;
   if (idle_first) profile.scored_from_s = profile.plateaus.front().to_s;
   if (profile.scored_from_s >= s.t.back()) profile.scored_from_s = 0.5 * (s.t.front() + s.t.back());
   return profile;

@@ -3,13 +3,15 @@
 //
 // Definitions (percentages are of rated torque; the truth is read at most once a millisecond):
 //   plateau      longest stretch covered by windows of 0.1 s in each of which the truth moves by no
-//                more than 0.2 %; so a drift of up to 2 % a second is a plateau. At least 0.2 s long.
+//                more than 0.2 %; so a drift of up to 2 % a second is a plateau. At least 0.2 s
+//                long.
 //   piece        between plateaus, from one turning point of the truth to the next; a turn counts
 //                from 0.5 % on, and from 3 % of what the truth spans between the plateaus.
 //   oscillation  four turns or more between two plateaus; else each piece of 5 % or more is
 //   step         if the truth goes from 10 to 90 % of it in no more than 0.25 s,
 //   ramp         if it takes longer.
-//   first idle   the first plateau, if it lies within 1 % of zero; what comes after its end is scored.
+//   first idle   the first plateau, if it lies within 1 % of zero; what comes after its end is
+//   scored.
 #pragma once
 
 #include <cstddef>

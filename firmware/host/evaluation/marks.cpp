@@ -13,16 +13,31 @@ constexpr double kRampError_pct = 0.12;
 constexpr double kToneLag_ms = 0.8;
 constexpr double kSlowTone_hz = 30.0;  // the goal names 15 and 120 Hz
 
-constexpr Marks kClean{.steady_pct = 0.05, .noise_pct = 0.03, .t50_ms = 1.2, .t90_ms = 1.2,
-                       .overshoot_pct = 2.0, .least_coverage_pct = 95.0, .ramps_and_tones = true};
-constexpr Marks kOffsets{.steady_pct = 0.05, .noise_pct = 0.08, .t50_ms = 1.5, .t90_ms = 1.5,
-                         .overshoot_pct = 4.0, .least_coverage_pct = 95.0, .ramps_and_tones = true};
-constexpr Marks kNoise{.steady_pct = 0.10, .noise_pct = 0.15, .t50_ms = 1.5, .t90_ms = 1.5,
-                       .overshoot_pct = 4.0, .least_coverage_pct = 95.0, .ramps_and_tones = true};
-constexpr Marks kPwm{.steady_pct = 0.10, .noise_pct = 0.25, .t50_ms = 1.5, .t90_ms = 1.5,
-                     .ramps_and_tones = true};
-constexpr Marks kInertia{.steady_pct = 0.05, .t50_ms = 3.5, .overshoot_pct = 11.0,
-                         .least_t50_ms = -2.5};
+constexpr Marks kClean{.steady_pct = 0.05,
+                       .noise_pct = 0.03,
+                       .t50_ms = 1.2,
+                       .t90_ms = 1.2,
+                       .overshoot_pct = 2.0,
+                       .least_coverage_pct = 95.0,
+                       .ramps_and_tones = true};
+constexpr Marks kOffsets{.steady_pct = 0.05,
+                         .noise_pct = 0.08,
+                         .t50_ms = 1.5,
+                         .t90_ms = 1.5,
+                         .overshoot_pct = 4.0,
+                         .least_coverage_pct = 95.0,
+                         .ramps_and_tones = true};
+constexpr Marks kNoise{.steady_pct = 0.10,
+                       .noise_pct = 0.15,
+                       .t50_ms = 1.5,
+                       .t90_ms = 1.5,
+                       .overshoot_pct = 4.0,
+                       .least_coverage_pct = 95.0,
+                       .ramps_and_tones = true};
+constexpr Marks kPwm{
+    .steady_pct = 0.10, .noise_pct = 0.25, .t50_ms = 1.5, .t90_ms = 1.5, .ramps_and_tones = true};
+constexpr Marks kInertia{
+    .steady_pct = 0.05, .t50_ms = 3.5, .overshoot_pct = 11.0, .least_t50_ms = -2.5};
 constexpr Marks kResistanceRated{.steady_pct = 0.30, .least_coverage_pct = 95.0};
 
 struct Named {
@@ -33,20 +48,31 @@ constexpr std::array<Named, 13> kByCondition{{
     {"as_recorded", kClean},
     {"offsets", kOffsets},
     {"offsets_noise", kNoise},
-    {"speed_noise_0.05", {.steady_pct = 0.25, .noise_pct = 0.22, .t50_ms = 7.0, .t90_ms = 9.0,
-                          .overshoot_pct = 11.0, .least_coverage_pct = 95.0, .sigma_pct = 1.0}},
-    {"speed_noise_0.2", {.steady_pct = 0.45, .noise_pct = 0.45, .t50_ms = 14.0, .t90_ms = 24.0,
-                         .overshoot_pct = 20.0, .least_coverage_pct = 95.0}},
+    {"speed_noise_0.05",
+     {.steady_pct = 0.25,
+      .noise_pct = 0.22,
+      .t50_ms = 7.0,
+      .t90_ms = 9.0,
+      .overshoot_pct = 11.0,
+      .least_coverage_pct = 95.0,
+      .sigma_pct = 1.0}},
+    {"speed_noise_0.2",
+     {.steady_pct = 0.45,
+      .noise_pct = 0.45,
+      .t50_ms = 14.0,
+      .t90_ms = 24.0,
+      .overshoot_pct = 20.0,
+      .least_coverage_pct = 95.0}},
     {"counts_4096", {.steady_pct = 0.1, .noise_pct = 0.1, .t50_ms = 11.0}},
     {"sample_counts_4096", {.steady_pct = 0.1, .noise_pct = 0.1, .t50_ms = 11.0}},
     {"counts_1024", {.steady_pct = 0.1, .noise_pct = 0.1, .t50_ms = 18.0}},
-    {"no_speed", {.steady_pct = 0.05, .noise_pct = 0.05, .t50_ms = 3.0, .t90_ms = 3.0,
-                  .overshoot_pct = 10.0}},
-    {"no_speed_noise", {.steady_pct = 0.4, .noise_pct = 0.1, .t50_ms = 24.0, .t90_ms = 36.0,
-                        .overshoot_pct = 16.0}},
+    {"no_speed",
+     {.steady_pct = 0.05, .noise_pct = 0.05, .t50_ms = 3.0, .t90_ms = 3.0, .overshoot_pct = 10.0}},
+    {"no_speed_noise",
+     {.steady_pct = 0.4, .noise_pct = 0.1, .t50_ms = 24.0, .t90_ms = 36.0, .overshoot_pct = 16.0}},
     {"two_currents", kClean},
-    {"two_currents_noise", {.steady_pct = 0.1, .noise_pct = 0.18, .t50_ms = 1.5, .t90_ms = 1.5,
-                            .overshoot_pct = 4.0}},
+    {"two_currents_noise",
+     {.steady_pct = 0.1, .noise_pct = 0.18, .t50_ms = 1.5, .t90_ms = 1.5, .overshoot_pct = 4.0}},
     {"voltage_+2", {.steady_pct = 0.35}},
 }};
 
@@ -55,7 +81,8 @@ Marks by_condition(std::string_view condition, const RecordingTraits& traits) {
   if (condition.starts_with("inertia_")) return kInertia;
   if (condition.starts_with("resistance_")) {
     // Without a declared iron loss the goal at rated speed is only "no worse than no adaptation".
-    if (traits.low_speed) return {.steady_pct = condition.find("40") == condition.npos ? 0.15 : 0.5};
+    if (traits.low_speed)
+      return {.steady_pct = condition.find("40") == condition.npos ? 0.15 : 0.5};
     return condition.ends_with("_iron") ? kResistanceRated : Marks{};
   }
   const auto found = std::find_if(kByCondition.begin(), kByCondition.end(),
@@ -65,8 +92,10 @@ Marks by_condition(std::string_view condition, const RecordingTraits& traits) {
 
 // No mark is looser than any mark.
 void loosen(std::optional<double>& mark, const std::optional<double>& other) {
-  if (!mark || !other) mark.reset();
-  else mark = std::max(*mark, *other);
+  if (!mark || !other)
+    mark.reset();
+  else
+    mark = std::max(*mark, *other);
 }
 
 Marks loosest(Marks a, const Marks& b) {
@@ -83,14 +112,18 @@ class Judge {
   void at_most(const char* name, const std::optional<double>& mark,
                const std::optional<double>& figure, bool due) {
     if (!mark || !due) return;
-    if (!figure) missing(name);
-    else if (!(*figure <= *mark)) complain(name, *figure, '>', *mark);
+    if (!figure)
+      missing(name);
+    else if (!(*figure <= *mark))
+      complain(name, *figure, '>', *mark);
   }
   void at_least(const char* name, const std::optional<double>& mark,
                 const std::optional<double>& figure, bool due) {
     if (!mark || !due) return;
-    if (!figure) missing(name);
-    else if (!(*figure >= *mark)) complain(name, *figure, '<', *mark);
+    if (!figure)
+      missing(name);
+    else if (!(*figure >= *mark))
+      complain(name, *figure, '<', *mark);
   }
   [[nodiscard]] std::vector<std::string> take() { return std::move(complaints_); }
 
@@ -98,8 +131,10 @@ class Judge {
   void missing(const char* name) { complaints_.push_back(std::string(name) + " none"); }
   void complain(const char* name, double figure, char relation, double mark) {
     std::array<char, 96> text{};
-    if (std::isinf(figure)) std::snprintf(text.data(), text.size(), "%s never", name);
-    else std::snprintf(text.data(), text.size(), "%s %.3g %c %.3g", name, figure, relation, mark);
+    if (std::isinf(figure))
+      std::snprintf(text.data(), text.size(), "%s never", name);
+    else
+      std::snprintf(text.data(), text.size(), "%s %.3g %c %.3g", name, figure, relation, mark);
     complaints_.emplace_back(text.data());
   }
 
@@ -123,8 +158,9 @@ bool any(const Marks& marks) {
 std::vector<std::string> missed(const Marks& marks, const LoadProfile& profile,
                                 const Metrics& metrics) {
   Judge judge;
-  const bool plateaus = std::any_of(profile.plateaus.begin(), profile.plateaus.end(),
-                                    [&](const Plateau& p) { return p.to_s > profile.scored_from_s; });
+  const bool plateaus =
+      std::any_of(profile.plateaus.begin(), profile.plateaus.end(),
+                  [&](const Plateau& p) { return p.to_s > profile.scored_from_s; });
   const bool steps = !profile.steps.empty();
   judge.at_most("steady", marks.steady_pct, metrics.steady_error_pct, plateaus);
   judge.at_most("sd", marks.noise_pct, metrics.noise_pct, plateaus);

@@ -40,8 +40,8 @@ class Scorer {
 
  private:
   [[nodiscard]] std::size_t index(double at_s) const {
-    return static_cast<std::size_t>(
-        std::lower_bound(e_.time_s.begin(), e_.time_s.end(), at_s) - e_.time_s.begin());
+    return static_cast<std::size_t>(std::lower_bound(e_.time_s.begin(), e_.time_s.end(), at_s) -
+                                    e_.time_s.begin());
   }
   [[nodiscard]] bool valid(std::size_t k) const { return std::isfinite(e_.torque_nm[k]); }
   [[nodiscard]] double error_nm(std::size_t k) const { return e_.torque_nm[k] - true_nm_[k]; }
@@ -80,8 +80,8 @@ class Scorer {
     for (auto k = static_cast<std::size_t>(begin - t.begin()); k < t.size() && t[k] <= to_s; ++k) {
       const bool beyond = up ? x[k] >= level : x[k] <= level;
       if (!beyond) continue;  // also where there is no estimate
-      const bool interpolable = k > 0 && std::isfinite(x[k - 1]) && t[k - 1] >= from_s &&
-                                x[k] != x[k - 1];
+      const bool interpolable =
+          k > 0 && std::isfinite(x[k - 1]) && t[k - 1] >= from_s && x[k] != x[k - 1];
       if (!interpolable) return t[k];
       const double part = (level - x[k - 1]) / (x[k] - x[k - 1]);
       return t[k - 1] + std::clamp(part, 0.0, 1.0) * (t[k] - t[k - 1]);
@@ -92,9 +92,10 @@ class Scorer {
   [[nodiscard]] double lag_ms(const LoadChange& step, double share) const {
     const double level = step.before_nm + share * (step.after_nm - step.before_nm);
     const bool up = step.after_nm > step.before_nm;
-    const double true_s = crossing_s(truth_.time_s, truth_.torque_nm, step.from_s, step.to_s, level, up);
-    const double seen_s = crossing_s(e_.time_s, e_.torque_nm, step.from_s - kBeforeStep_s,
-                                     step.until_s, level, up);
+    const double true_s =
+        crossing_s(truth_.time_s, truth_.torque_nm, step.from_s, step.to_s, level, up);
+    const double seen_s =
+        crossing_s(e_.time_s, e_.torque_nm, step.from_s - kBeforeStep_s, step.until_s, level, up);
     return std::isnan(seen_s) ? kInfinity : 1e3 * (seen_s - true_s);
   }
 
@@ -143,8 +144,7 @@ class Scorer {
     const std::size_t last = index(ramp.to_s - trim_s);
     for (std::size_t k = std::max<std::size_t>(1, index(ramp.from_s + trim_s)); k < last; ++k) {
       if (!valid(k)) continue;
-      const double slope =
-          (true_nm_[k] - true_nm_[k - 1]) / (e_.time_s[k] - e_.time_s[k - 1]);
+      const double slope = (true_nm_[k] - true_nm_[k - 1]) / (e_.time_s[k] - e_.time_s[k - 1]);
       with_slope += error_nm(k) * slope;
       slope_square += slope * slope;
       sum += error_nm(k);
@@ -181,12 +181,11 @@ class Scorer {
     if (!(amplitude > 0.0)) return;
     const double phase = std::atan2(seen.sine * real.cosine - seen.cosine * real.sine,
                                     seen.cosine * real.cosine + seen.sine * real.sine);
-    metrics_.tones.push_back(
-        {.frequency_hz = tone.frequency_hz,
-         .amplitude_pct = tone.amplitude_nm * pct_,
-         .gain_ratio = std::hypot(seen.cosine, seen.sine) / amplitude,
-         .lag_ms = 1e3 * phase / (2.0 * std::numbers::pi * tone.frequency_hz),
-         .phase_deg = phase * 180.0 / std::numbers::pi});
+    metrics_.tones.push_back({.frequency_hz = tone.frequency_hz,
+                              .amplitude_pct = tone.amplitude_nm * pct_,
+                              .gain_ratio = std::hypot(seen.cosine, seen.sine) / amplitude,
+                              .lag_ms = 1e3 * phase / (2.0 * std::numbers::pi * tone.frequency_hz),
+                              .phase_deg = phase * 180.0 / std::numbers::pi});
   }
 
   [[nodiscard]] double usual_period_s() const {

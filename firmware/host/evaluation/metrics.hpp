@@ -14,7 +14,8 @@
 //   coverage         share of the time with an estimate in which |error| <= 2 sigma, counted from
 //                    the end of the first idle
 //   mean sigma       over the same time, % of rated torque
-//   ramp lag         -sum(error * slope) / sum(slope^2) over the middle 80 % of a ramp: the delay of
+//   ramp lag         -sum(error * slope) / sum(slope^2) over the middle 80 % of a ramp: the delay
+//   of
 //                    the truth that fits best; ramp error is the |mean error| there; worst ramp
 //   tones            ratio of amplitudes and delay in the phase at a tone's frequency, both series
 //                    fitted alike (Hann-weighted least squares)

@@ -101,8 +101,8 @@ double highest_line_hz(std::span<const double> t, std::span<const double> x, dou
     const double angle = kTwoPi * first_hz * (t[k] - middle_s);
     const double turn = kTwoPi * grid_hz * (t[k] - middle_s);
     const double weighted = c * c * x[k];
-    phasors.push_back({weighted * std::cos(angle), weighted * std::sin(angle), std::cos(turn),
-                       std::sin(turn)});
+    phasors.push_back(
+        {weighted * std::cos(angle), weighted * std::sin(angle), std::cos(turn), std::sin(turn)});
   }
   double best_hz = 0.0;
   double best = 0.0;
@@ -131,8 +131,10 @@ double strongest_hz(std::span<const double> t, std::span<const double> x) {
   for (int k = 0; k < kGoldenSteps && best_hz > 0.0; ++k) {
     const double a = high - kGolden * (high - low);
     const double b = low + kGolden * (high - low);
-    if (regress(t, x, a).residual < regress(t, x, b).residual) high = b;
-    else low = a;
+    if (regress(t, x, a).residual < regress(t, x, b).residual)
+      high = b;
+    else
+      low = a;
   }
   return best_hz > 0.0 ? 0.5 * (low + high) : 0.0;
 }

@@ -115,8 +115,9 @@ class Reader {
       if (!cell.empty()) {
         const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
         if (error != std::errc{} || end != cell.data() + cell.size())
-          return fail("column " + std::string(place.name) + " holds no number: " + std::string(cell),
-                      "write a decimal number, or leave the cell empty");
+          return fail(
+              "column " + std::string(place.name) + " holds no number: " + std::string(cell),
+              "write a decimal number, or leave the cell empty");
       }
       if (place.name == "t_s" && !(value > last_s_))
         return fail("time does not increase", "sort the rows and remove doubled ones");
@@ -139,9 +140,8 @@ class Reader {
 
   Columns finish() {
     std::erase_if(columns_.numbers, [](const auto& column) {
-      return column.first != "t_s" &&
-             std::none_of(column.second.begin(), column.second.end(),
-                          [](double x) { return std::isfinite(x); });
+      return column.first != "t_s" && std::none_of(column.second.begin(), column.second.end(),
+                                                   [](double x) { return std::isfinite(x); });
     });
     return std::move(columns_);
   }

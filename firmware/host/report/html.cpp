@@ -29,7 +29,8 @@ std::string shown(const Json& value) {
 void machine_rows(const Json& object, const std::string& prefix, std::string& out) {
   for (const auto& [key, value] : object.items()) {
     const std::string name = prefix.empty() ? key : prefix + "." + key;
-    if (value.is_object()) machine_rows(value, name, out);
+    if (value.is_object())
+      machine_rows(value, name, out);
     else
       out += "<tr><th scope=\"row\">" + escaped(name) + "</th><td class=\"number\">" +
              escaped(shown(value)) + "</td></tr>\n";
@@ -43,12 +44,23 @@ std::string escaped(std::string_view text) {
   out.reserve(text.size());
   for (const char c : text) {
     switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      case '\'': out += "&#39;"; break;
-      default: out += c;
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      case '\'':
+        out += "&#39;";
+        break;
+      default:
+        out += c;
     }
   }
   return out;
@@ -58,8 +70,10 @@ std::string script_safe(std::string_view json) {
   std::string out;
   out.reserve(json.size());
   for (const char c : json) {
-    if (c == '<') out += "\\u003c";
-    else out += c;
+    if (c == '<')
+      out += "\\u003c";
+    else
+      out += c;
   }
   return out;
 }
@@ -96,12 +110,14 @@ const Json& list_in(const Json& object, const char* key) {
 std::string figure_table(const Json& summary) {
   const Json& figures = list_in(summary, "figures");
   if (figures.empty()) return {};
-  std::string out = "<section><h2>Figures</h2>\n<div class=\"scroll\"><table class=\"figures\">\n"
-                    "<thead><tr><th scope=\"col\">What</th><th scope=\"col\" class=\"number\">Value</th>"
-                    "<th scope=\"col\">Unit</th><th scope=\"col\">Note</th></tr></thead>\n<tbody>\n";
+  std::string out =
+      "<section><h2>Figures</h2>\n<div class=\"scroll\"><table class=\"figures\">\n"
+      "<thead><tr><th scope=\"col\">What</th><th scope=\"col\" class=\"number\">Value</th>"
+      "<th scope=\"col\">Unit</th><th scope=\"col\">Note</th></tr></thead>\n<tbody>\n";
   for (const auto& figure : figures) {
     if (!figure.is_object()) continue;
-    out += "<tr><th scope=\"row\">" + escaped(text_in(figure, "name")) + "</th><td class=\"number\">" +
+    out += "<tr><th scope=\"row\">" + escaped(text_in(figure, "name")) +
+           "</th><td class=\"number\">" +
            (figure.contains("value") ? escaped(shown(figure["value"])) : "") + "</td><td>" +
            escaped(text_in(figure, "unit")) + "</td><td class=\"note\">" +
            escaped(text_in(figure, "note")) + "</td></tr>\n";
@@ -112,9 +128,10 @@ std::string figure_table(const Json& summary) {
 std::string event_table(const Json& summary) {
   const Json& events = list_in(summary, "events");
   if (events.empty()) return {};
-  std::string out = "<section><h2>Events</h2>\n<div class=\"scroll\"><table class=\"events\">\n"
-                    "<thead><tr><th scope=\"col\">No.</th><th scope=\"col\" class=\"number\">Time, s</th>"
-                    "<th scope=\"col\">What happened</th></tr></thead>\n<tbody>\n";
+  std::string out =
+      "<section><h2>Events</h2>\n<div class=\"scroll\"><table class=\"events\">\n"
+      "<thead><tr><th scope=\"col\">No.</th><th scope=\"col\" class=\"number\">Time, s</th>"
+      "<th scope=\"col\">What happened</th></tr></thead>\n<tbody>\n";
   int number = 0;
   for (const auto& event : events) {
     if (!event.is_object() || !event.contains("t_s") || !event["t_s"].is_number()) continue;

@@ -57,9 +57,13 @@ Json grid(const std::vector<double>& t) {
 Json number_or_null(const std::optional<double>& x) { return x ? Json(*x) : Json(nullptr); }
 
 Json embedded(const Run& run, const Json& summary, const std::vector<TraceFile>& traces) {
-  Json data{{"time", grid(run.time_s)}, {"series", Json::object()}, {"strips", Json::object()},
-            {"traces", Json::array()}, {"events", Json::array()},
-            {"entry_s", number_or_null(run.entry_s)}, {"exit_s", number_or_null(run.exit_s)}};
+  Json data{{"time", grid(run.time_s)},
+            {"series", Json::object()},
+            {"strips", Json::object()},
+            {"traces", Json::array()},
+            {"events", Json::array()},
+            {"entry_s", number_or_null(run.entry_s)},
+            {"exit_s", number_or_null(run.exit_s)}};
   for (const auto& series : run.series) data["series"][series.key] = base64(series.values);
   for (const auto& strip : run.strips) {
     Json runs = Json::array();
@@ -81,8 +85,8 @@ std::expected<Json, InputError> read_summary(const std::filesystem::path& path) 
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   Json summary = Json::parse(text, nullptr, false);
   if (!summary.is_object())
-    return std::unexpected(InputError{path.string(), "this is not a JSON object",
-                                      "let the program write it again"});
+    return std::unexpected(
+        InputError{path.string(), "this is not a JSON object", "let the program write it again"});
   if (text_in(summary, "title").empty())
     return std::unexpected(InputError{path.string() + ": title", "a line of text is missing here",
                                       "give the run a title"});
@@ -104,7 +108,8 @@ std::expected<std::vector<TraceFile>, InputError> traces_of(const Json& summary,
 
 std::string lead(const Json& summary, const std::vector<TraceFile>& traces) {
   std::string text;
-  for (const auto& trace : traces) text += (text.empty() ? "Estimate " : ", beside it ") + trace.name;
+  for (const auto& trace : traces)
+    text += (text.empty() ? "Estimate " : ", beside it ") + trace.name;
   const std::string recording = text_in(summary, "recording");
   if (!recording.empty()) text += "; recording " + recording;
   return text + ".";

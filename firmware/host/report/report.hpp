@@ -4,15 +4,18 @@
 // A run directory holds
 //   summary.json   {
 //     "title":     "Step in depth of cut",               a line in words
-//     "recording": "recording.csv.gz",                   INTERFACES section 1, plain or gzip; optional.
-//                                                        Only truth, measured_force_n and override_pct
-//                                                        are read
-//     "traces":    [{"name": "fused", "path": "trace.csv"}, ...]   INTERFACES section 2, plain or gzip;
+//     "recording": "recording.csv.gz",                   INTERFACES section 1, plain or gzip;
+//     optional.
+//                                                        Only truth, measured_force_n and
+//                                                        override_pct are read
+//     "traces":    [{"name": "fused", "path": "trace.csv"}, ...]   INTERFACES section 2, plain or
+//     gzip;
 //                                                        the first is the run itself. Traces named
-//                                                        "computed" and "synthesized" are drawn like
-//                                                        Fig. 1 and Fig. 2 of P3
+//                                                        "computed" and "synthesized" are drawn
+//                                                        like Fig. 1 and Fig. 2 of P3
 //     "figures":   [{"name": "Lag to 50 %", "value": 1.1, "unit": "ms", "note": "goal 1.2"}, ...]
-//                                                        value a number or a text; unit, note optional
+//                                                        value a number or a text; unit, note
+//                                                        optional
 //     "events":    [{"t_s": 2.0, "text": "tool enters"}, ...]
 //     "machine":   {"motor": {"pole_pairs": 2, ...}, ...}          any nesting
 //   }

@@ -18,9 +18,10 @@ constexpr double kStalePeriods = 3.0;
 constexpr double kLoad_ratio = 0.1;
 
 constexpr std::array<std::string_view, 10> kTraceNumbers{
-    "airgap_power_w",          "measured_power_w", "airgap_torque_nm",      "load_torque_nm",
-    "cutting_torque_nm",       "cutting_torque_sigma_nm", "cutting_force_n",
-    "cutting_force_sigma_n",   "override_pct",     "speed_rad_s"};
+    "airgap_power_w",  "measured_power_w",      "airgap_torque_nm",
+    "load_torque_nm",  "cutting_torque_nm",     "cutting_torque_sigma_nm",
+    "cutting_force_n", "cutting_force_sigma_n", "override_pct",
+    "speed_rad_s"};
 constexpr std::array<std::string_view, 4> kOtherTraceNumbers{
     "cutting_torque_nm", "cutting_torque_sigma_nm", "cutting_force_n", "cutting_force_sigma_n"};
 constexpr std::array<std::string_view, 3> kTraceWords{"source", "state", "fault"};
@@ -81,7 +82,8 @@ WordStrip strip(std::string key, const std::vector<double>& t, const Words& word
   for (std::size_t k = 0; k < words.index.size(); ++k) {
     const std::string& word = words.dictionary[words.index[k]];
     // A row describes the window that ends at its time stamp.
-    const double from_s = k == 0 ? t[k] - period_s : std::max(t[k - 1], t[k] - kStalePeriods * period_s);
+    const double from_s =
+        k == 0 ? t[k] - period_s : std::max(t[k - 1], t[k] - kStalePeriods * period_s);
     if (!out.runs.empty() && out.runs.back().word == word && out.runs.back().to_s >= from_s - 1e-9)
       out.runs.back().to_s = t[k];
     else
@@ -195,9 +197,10 @@ std::expected<Run, hal::host::InputError> read_run(const std::vector<TraceFile>&
                                                    std::size_t most_rows) {
   std::vector<Columns> tables;
   for (const auto& trace : traces) {
-    auto table = read_columns(trace.path, tables.empty()
-                                              ? WantedColumns{list(kTraceNumbers), list(kTraceWords)}
-                                              : WantedColumns{list(kOtherTraceNumbers), list(kOtherTraceWords)});
+    auto table = read_columns(
+        trace.path, tables.empty()
+                        ? WantedColumns{list(kTraceNumbers), list(kTraceWords)}
+                        : WantedColumns{list(kOtherTraceNumbers), list(kOtherTraceWords)});
     if (!table) return std::unexpected(table.error());
     tables.push_back(std::move(*table));
   }

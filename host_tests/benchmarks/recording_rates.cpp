@@ -179,5 +179,3 @@ BENCHMARK_CAPTURE(write_trace, csv_gz, "t.csv.gz")->Unit(benchmark::kMillisecond
 
 }  // namespace
 }  // namespace cutforce
-
-BENCHMARK_MAIN();

@@ -1,0 +1,408 @@
+#include "firmware/control_loop.hpp"
+
+#include "estimator/polynomials.hpp"
+
+namespace cutforce::firmware {
+namespace {
+
+using estimator::AirCut;
+using estimator::Fault;
+using estimator::SampleGate;
+using hal::Signal;
+
+// Unfiltered voltages show themselves within 0.2 s of turning; before that nothing is published.
+constexpr float kProof_s = 0.3F;
+constexpr float kTurning_rad_s = 18.8F;  // electrical, 3 Hz
+constexpr float kCalibrationMemory_s = 3.0F;
+constexpr float kDoubtful_ratio = 10.0F;  // sigma with a fault that the estimate may survive
+
+bool impossible(estimator::FaultSet faults) noexcept { return faults.contains(Fault::kRawPwm); }
+
+bool doubtful(estimator::FaultSet faults) noexcept {
+  return faults.contains(Fault::kStuckChannel) || faults.contains(Fault::kLostPhase) ||
+         faults.contains(Fault::kPhaseOrder) || faults.contains(Fault::kClipped);
+}
+
+}  // namespace
+
+ControlLoop::ControlLoop(const Config& config) noexcept
+    : config_(config),
+      gate_(*SampleGate::make(config.gate)),
+      front_end_(*estimator::FrontEnd::make(config.front_end)),
+      health_(*estimator::SignalHealth::make(config.health)),
+      calibration_(*estimator::IdleCalibration::make(config.calibration)),
+      fused_(*estimator::FusedObserver::make(config.fused)),
+      path_(*estimator::TorquePath::make(config.path)),
+      load_friction_(*estimator::LoadFriction::make(config.load_friction)),
+      force_(*estimator::CuttingForce::make(config.force)),
+      controller_(*control::ControlPath::make(config.controller)) {
+  own_.calibration = config.front_end.calibration;
+  own_.diameter_m = config.fixed_diameter_m;
+  const auto neutral =
+      static_cast<std::uint8_t>(config.controller.feed_override.initial_pct + 0.5F);
+  command_ = {.time_ns = 0,
+              .override_pct = neutral,
+              .override_code = control::encode(config.controller.code, neutral),
+              .controlling = false};
+}
+
+auto ControlLoop::make(const Config& config) noexcept -> std::expected<ControlLoop, ConfigError> {
+  const auto fail = [](ConfigError error) { return std::unexpected{error}; };
+  if (config.samples_per_estimate < 1 || config.estimates_per_control < 1) {
+    return fail(ConfigError::kPeriods);
+  }
+  if (!config.gate.check()) return fail(ConfigError::kGate);
+  if (!config.front_end.check()) return fail(ConfigError::kFrontEnd);
+  if (!config.health.check()) return fail(ConfigError::kHealth);
+  if (!config.calibration.check()) return fail(ConfigError::kCalibration);
+  if (!config.fused.check()) return fail(ConfigError::kFused);
+  if (!config.path.check()) return fail(ConfigError::kTorquePath);
+  if (!config.load_friction.check()) return fail(ConfigError::kLoadFriction);
+  if (!config.force.check()) return fail(ConfigError::kCuttingForce);
+  if (!config.controller.check()) return fail(ConfigError::kControl);
+  return ControlLoop{config};
+}
+
+auto ControlLoop::state() const noexcept -> State {
+  return {.gate = gate_.state(),
+          .front_end = front_end_.state(),
+          .health = health_.state(),
+          .calibration = calibration_.state(),
+          .fused = fused_.state(),
+          .path = path_.state(),
+          .controller = controller_.state(),
+          .own = own_,
+          .command = command_};
+}
+
+void ControlLoop::restore(const State& state) noexcept {
+  gate_.restore(state.gate);
+  front_end_.restore(state.front_end);
+  health_.restore(state.health);
+  calibration_.restore(state.calibration);
+  fused_.restore(state.fused);
+  path_.restore(state.path);
+  controller_.restore(state.controller);
+  own_ = state.own;
+  command_ = state.command;
+}
+
+void ControlLoop::restart() noexcept {
+  fused_.restart();
+  path_.restart();
+  health_.restart();
+  calibration_.close();
+  own_.has_path = 0;
+}
+
+void ControlLoop::note_commands(const hal::Sample& sample) noexcept {
+  if (sample.has(Signal::kFeedActive)) {
+    // An active feed may still be the approach: contact is told from the torque then.
+    own_.feed = sample.feed_active > 0.5F ? 0U : 1U;
+  }
+  if (sample.has(Signal::kWorkpieceDiameter)) own_.diameter_m = sample.workpiece_diameter_m;
+  if (sample.has(Signal::kEnable)) own_.enabled = sample.enable > 0.5F ? 1U : 0U;
+  own_.override_reported = sample.has(Signal::kOverrideApplied) ? 1U : 0U;
+  own_.override_reported_pct = sample.override_applied_pct;
+  if (sample.has(Signal::kMeasuredForce)) {
+    own_.dynamometer_n += sample.measured_force_n;
+    ++own_.dynamometer_count;
+  }
+}
+
+auto ControlLoop::step(const hal::Sample& sample) noexcept -> std::optional<LoopOutput> {
+  std::uint32_t present = 0;
+  if (sample.has(Signal::kSpeed)) present |= SampleGate::kSpeed;
+  if (sample.has(Signal::kPowerMeter)) present |= SampleGate::kPower;
+  const SampleGate::Output gated = gate_.step({.time_ns = sample.time_ns,
+                                               .values = {.voltage_v = sample.voltage_v,
+                                                          .current_a = sample.current_a,
+                                                          .speed_rad_s = sample.speed_rad_s,
+                                                          .power_w = sample.power_meter_w},
+                                               .present = present});
+  own_.faults = own_.faults | gated.faults;
+  if (gated.verdict == SampleGate::Verdict::kDrop) return std::nullopt;
+  if (gated.verdict == SampleGate::Verdict::kRestart) restart();
+  note_commands(sample);
+
+  const SampleGate::Values& values = gate_.values();
+  const estimator::FrontEnd::Output front =
+      front_end_.step({.voltage_v = values.voltage_v, .current_a = values.current_a});
+  const bool speed_valid = (gated.present & SampleGate::kSpeed) != 0;
+  const bool meter_valid = (gated.present & SampleGate::kPower) != 0;
+  own_.speed_rad_s = values.speed_rad_s;
+  own_.speed_present = speed_valid ? 1U : 0U;
+  own_.meter_w = values.power_w;
+  own_.meter_present = meter_valid ? 1U : 0U;
+  if (calibration_.is_open()) {
+    estimator::IdleCalibration::Channels channels{};
+    const estimator::Calibration& c = own_.calibration;
+    for (std::size_t k = 0; k < 3; ++k) {
+      channels[k] = c.voltage_gain_ratio[k] * (values.voltage_v[k] - c.voltage_offset_v[k]);
+      channels[k + 3] = c.current_gain_ratio[k] * (values.current_a[k] - c.current_offset_a[k]);
+    }
+    if (!config_.current_w_present) channels[5] = -(channels[3] + channels[4]);
+    calibration_.step(channels);
+  }
+  health_.observe({.voltage_v = values.voltage_v,
+                   .current_a = values.current_a,
+                   .motor = front.motor,
+                   .current_residual_a = front.current_residual_a,
+                   .elapsed_periods = gated.elapsed_periods,
+                   .at_end_channels = gated.at_end_channels});
+  if (config_.estimator == EstimatorName::kFused) {
+    fused_.step({.motor = front.motor,
+                 .speed_rad_s = values.speed_rad_s,
+                 .power_meter_w = values.power_w,
+                 .elapsed_periods = gated.elapsed_periods,
+                 .speed_valid = speed_valid,
+                 .meter_valid = meter_valid});
+  } else if (config_.estimator != EstimatorName::kDynamometer) {
+    const auto path =
+        path_.step({.motor = front.motor,
+                    .speed_rad_s = values.speed_rad_s,
+                    .power_meter_w = values.power_w,
+                    .motor_valid = true,
+                    .speed_valid = speed_valid,
+                    .meter_valid = meter_valid,
+                    .feed = own_.feed == 1 ? estimator::Feed::kAir : estimator::Feed::kUnknown});
+    if (path) {
+      own_.path = *path;
+      own_.has_path = 1;
+    }
+  }
+
+  own_.time_ns = sample.time_ns;
+  own_.elapsed_periods += gated.elapsed_periods;
+  if (own_.elapsed_periods < static_cast<float>(config_.samples_per_estimate) - 0.5F) {
+    return std::nullopt;
+  }
+  own_.elapsed_periods = 0.0F;
+  return close_estimate();
+}
+
+void ControlLoop::watch_health(LoopOutput& out) noexcept {
+  const estimator::SignalHealth::Output health =
+      health_.step({.frequency_rad_s = own_.frequency_rad_s,
+                    .speed_rad_s = own_.speed_rad_s,
+                    .speed_present = own_.speed_present != 0});
+  out.faults = own_.faults | health.faults;
+  own_.faults = {};
+  const float magnitude =
+      own_.frequency_rad_s < 0.0F ? -own_.frequency_rad_s : own_.frequency_rad_s;
+  if (impossible(out.faults)) {
+    own_.turning_s = 0.0F;
+    out.state = LoopState::kRefused;
+  } else if (magnitude > kTurning_rad_s && own_.turning_s < kProof_s) {
+    own_.turning_s += config_.health.tick_period_s;
+  }
+}
+
+void ControlLoop::apply_calibration(const estimator::IdleCalibration::Result& result) noexcept {
+  const float length_s =
+      static_cast<float>(calibration_.state().filled) * config_.gate.sample_period_s;
+  const float share = own_.calibrated_s > 0.0F ? length_s / (length_s + own_.calibrated_s) : 1.0F;
+  own_.calibrated_s += length_s;
+  if (own_.calibrated_s > kCalibrationMemory_s) own_.calibrated_s = kCalibrationMemory_s;
+  estimator::Calibration& c = own_.calibration;
+  const std::size_t currents = config_.current_w_present ? 3 : 2;
+  for (std::size_t k = 0; k < 3; ++k) {
+    c.voltage_offset_v[k] += share * result.offset[k] / c.voltage_gain_ratio[k];
+    c.voltage_gain_ratio[k] *= 1.0F + share * (result.gain[k] - 1.0F);
+  }
+  for (std::size_t k = 0; k < currents; ++k) {
+    c.current_offset_a[k] += share * result.offset[k + 3] / c.current_gain_ratio[k];
+    c.current_gain_ratio[k] *= 1.0F + share * (result.gain[k + 3] - 1.0F);
+  }
+  // What the vectors of a silent input move by is what the offsets took off.
+  const estimator::FrontEnd::Input silent{.voltage_v = {}, .current_a = {}};
+  const auto before = front_end_.step(silent).motor;
+  if (!front_end_.set_calibration(c)) return;
+  const auto after = front_end_.step(silent).motor;
+  fused_.recalibrated({before.voltage_v.alpha - after.voltage_v.alpha,
+                       before.voltage_v.beta - after.voltage_v.beta},
+                      {before.current_a.alpha - after.current_a.alpha,
+                       before.current_a.beta - after.current_a.beta});
+}
+
+void ControlLoop::calibrate(const estimator::FusedObserver::Output& fused) noexcept {
+  const bool usable = fused.valid && fused.even_frequency_rad_s != 0.0F &&
+                      (fused.phase == AirCut::Phase::kIdle || !fused.calibrated);
+  if (!usable || doubtful(own_.last.faults)) {
+    calibration_.close();
+  } else if (calibration_.is_full()) {
+    apply_calibration(calibration_.take());
+  } else if (!calibration_.is_open()) {
+    calibration_.open(fused.even_frequency_rad_s, 0.0F);
+  }
+}
+
+void ControlLoop::estimate_fused(LoopOutput& out) noexcept {
+  const AirCut::Feed feed = own_.feed == 1 ? AirCut::Feed::kIdle : AirCut::Feed::kUnknown;
+  const estimator::FusedObserver::Output fused = fused_.tick(feed);
+  own_.frequency_rad_s = fused.valid ? fused.frequency_rad_s : 0.0F;
+  if (config_.voltage_lead_s != 0.0F) {
+    const float angle = fused.frequency_rad_s * config_.voltage_lead_s;
+    front_end_.set_rotation(estimator::cos_small(angle), estimator::sin_small(angle));
+  }
+  if (config_.fused.calibrate) calibrate(fused);
+  if (own_.meter_present != 0) {
+    out.measured_power_w = own_.meter_w;
+    out.present |= LoopOutput::kMeasuredPower;
+  }
+  const bool slow = own_.speed_present != 0 && !config_.fused.sensorless &&
+                    own_.speed_rad_s < config_.force_minimum_speed_rad_s &&
+                    own_.speed_rad_s > -config_.force_minimum_speed_rad_s;
+  if (!fused.valid || slow) {
+    out.state = fused.tared ? LoopState::kNoEstimate : LoopState::kStarting;
+    if (own_.turning_s > 0.0F) out.state = LoopState::kNoEstimate;
+    return;
+  }
+  out.state = fused.phase == AirCut::Phase::kCut ? LoopState::kCut : LoopState::kAir;
+  if (!fused.tared && fused.phase == AirCut::Phase::kUnsteady) out.state = LoopState::kStarting;
+  const auto cutting =
+      load_friction_.step({.torque_nm = fused.net_torque_nm, .speed_rad_s = fused.speed_rad_s});
+  out.airgap_power_w = fused.airgap_power_w;
+  out.airgap_torque_nm = fused.airgap_torque_nm;
+  out.load_torque_nm = fused.load_torque_nm;
+  out.cutting_torque_nm = cutting.cutting_torque_nm;
+  out.cutting_torque_sigma_nm = fused.net_sigma_nm * cutting.sensitivity_ratio;
+  out.source = Source::kFused;
+  out.present |= LoopOutput::kAirGapPower | LoopOutput::kAirGapTorque | LoopOutput::kLoadTorque |
+                 LoopOutput::kCuttingTorque;
+  own_.shaft_rad_s = fused.speed_rad_s;
+}
+
+void ControlLoop::estimate_path(LoopOutput& out) const noexcept {
+  const estimator::TorquePath::Output& path = own_.path;
+  out.state = LoopState::kStarting;
+  if (own_.has_path == 0) return;
+  if (path.airgap_power_valid) {
+    out.airgap_power_w = path.airgap_power_w;
+    out.present |= LoopOutput::kAirGapPower;
+  }
+  if (path.measured_power_valid) {
+    out.measured_power_w = path.measured_power_w;
+    out.present |= LoopOutput::kMeasuredPower;
+  }
+  if (!path.torque_valid) {
+    out.state = own_.turning_s > 0.0F ? LoopState::kNoEstimate : LoopState::kStarting;
+    return;
+  }
+  out.state = path.in_cut ? LoopState::kCut : (path.tared ? LoopState::kAir : LoopState::kStarting);
+  out.airgap_torque_nm = path.airgap_torque_nm;
+  out.load_torque_nm = path.load_torque_nm;
+  out.cutting_torque_nm = path.cutting_torque_nm;
+  out.cutting_torque_sigma_nm = path.cutting_torque_sigma_nm;
+  out.source = path.origin == estimator::TorquePath::Origin::kMeasured ? Source::kMeasured
+                                                                       : Source::kComputed;
+  out.present |= LoopOutput::kAirGapTorque | LoopOutput::kLoadTorque | LoopOutput::kCuttingTorque;
+}
+
+void ControlLoop::estimate_dynamometer(LoopOutput& out) noexcept {
+  out.state = LoopState::kNoEstimate;
+  if (own_.dynamometer_count == 0) return;
+  out.cutting_force_n = own_.dynamometer_n / static_cast<float>(own_.dynamometer_count);
+  out.cutting_force_sigma_n = config_.dynamometer_sigma_n;
+  out.source = Source::kDynamometer;
+  out.state = out.cutting_force_n >
+                      config_.controller.cut_state.on_ratio * config_.controller.force_reference_n
+                  ? LoopState::kCut
+                  : LoopState::kAir;
+  out.present |= LoopOutput::kCuttingForce;
+}
+
+void ControlLoop::add_force(LoopOutput& out) noexcept {
+  if ((out.present & LoopOutput::kCuttingTorque) == 0) return;
+  if (doubtful(out.faults)) out.cutting_torque_sigma_nm *= kDoubtful_ratio;
+  const float speed =
+      config_.estimator == EstimatorName::kFused ? own_.shaft_rad_s : own_.path.speed_rad_s;
+  const auto force = force_.step({.cutting_torque_nm = out.cutting_torque_nm,
+                                  .cutting_torque_sigma_nm = out.cutting_torque_sigma_nm,
+                                  .speed_rad_s = speed,
+                                  .diameter_m = own_.diameter_m});
+  if (force.status == estimator::CuttingForce::Status::kBelowMinimumSpeed) {
+    out.state = LoopState::kNoEstimate;
+  }
+  if (force.status != estimator::CuttingForce::Status::kForce) return;
+  out.cutting_force_n = force.force_n;
+  out.cutting_force_sigma_n = force.force_sigma_n;
+  out.present |= LoopOutput::kCuttingForce;
+}
+
+void ControlLoop::control_tick(LoopOutput& out) noexcept {
+  const bool valid = own_.force_count > 0 && own_.force_due == 0;
+  const float count = own_.force_count > 0 ? static_cast<float>(own_.force_count) : 1.0F;
+  const auto controlled = controller_.step({.force_n = own_.force_n / count,
+                                            .force_sigma_n = own_.force_sigma_n / count,
+                                            .force_age_ticks = 0,
+                                            .override_reported_pct = own_.override_reported_pct,
+                                            .force_valid = valid,
+                                            .override_reported = own_.override_reported != 0,
+                                            .enable = config_.control && own_.enabled != 0});
+  command_ = {.time_ns = own_.time_ns,
+              .override_pct = controlled.override_pct,
+              .override_code = controlled.override_code,
+              .controlling = controlled.controlling};
+  own_.force_n = own_.force_sigma_n = 0.0F;
+  own_.force_count = own_.force_due = 0;
+  own_.dynamometer_n = 0.0F;
+  own_.dynamometer_count = 0;
+  out.control_tick = true;
+}
+
+auto ControlLoop::close_estimate() noexcept -> LoopOutput {
+  LoopOutput out{};
+  out.time_ns = own_.time_ns;
+  ++own_.estimates;
+  const bool control = own_.estimates >= config_.estimates_per_control;
+  switch (config_.estimator) {
+    case EstimatorName::kFused:
+      estimate_fused(out);
+      break;
+    case EstimatorName::kDynamometer:
+      estimate_dynamometer(out);
+      break;
+    case EstimatorName::kMeasured:
+    case EstimatorName::kComputed:
+    case EstimatorName::kSynthesized:
+      estimate_path(out);
+      own_.frequency_rad_s = own_.has_path != 0 && own_.path.speed_valid
+                                 ? own_.path.synchronous_rad_s * config_.path.synchronous.pole_pairs
+                                 : 0.0F;
+      break;
+  }
+  const bool by_motor = config_.estimator != EstimatorName::kDynamometer;
+  if (by_motor) {
+    watch_health(out);
+    if (out.state == LoopState::kRefused || own_.turning_s < kProof_s) {
+      if (out.state != LoopState::kRefused) out.state = LoopState::kStarting;
+      const LoopState state = out.state;
+      const estimator::FaultSet faults = out.faults;
+      out = LoopOutput{};
+      out.time_ns = own_.time_ns;
+      out.state = state;
+      out.faults = faults;
+    }
+    add_force(out);
+  }
+  if ((out.present & LoopOutput::kCuttingForce) != 0 && !(by_motor && doubtful(out.faults))) {
+    own_.force_n += out.cutting_force_n;
+    own_.force_sigma_n += out.cutting_force_sigma_n;
+    ++own_.force_count;
+  } else {
+    ++own_.force_due;
+  }
+  if (control) {
+    own_.estimates = 0;
+    control_tick(out);
+  }
+  if (config_.control) {
+    out.override_pct = static_cast<float>(command_.override_pct);
+    out.present |= LoopOutput::kOverride;
+  }
+  own_.last = out;
+  return out;
+}
+
+}  // namespace cutforce::firmware
