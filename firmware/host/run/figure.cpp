@@ -24,7 +24,8 @@ std::string shown(const std::variant<double, std::string>& value) {
   std::array<char, 32> text{};
   const double number = std::get<double>(value);
   const bool whole = number == std::round(number) && std::abs(number) < 1e9;
-  std::snprintf(text.data(), text.size(), whole ? "%.0f" : "%.4g", number);
+  const char* format = whole ? "%.0f" : std::abs(number) < 100.0 ? "%.3g" : "%.4g";
+  std::snprintf(text.data(), text.size(), format, number);
   return text.data();
 }
 
