@@ -109,7 +109,7 @@ TEST(SimulatedMachine, TurnsTheTorqueLeftOverIntoKineticEnergy) {
   double work_j = 0.0;
   double gross_j = 0.0;
   for (std::size_t k = 1; k < rows.size(); ++k) {
-    const auto power_w = [](const Truth& t) {
+    const auto power_w = [](const MachineTruth& t) {
       return (t.airgap_torque_nm - t.load_torque_nm) * t.speed_rad_s;
     };
     const double step_j = 0.5 * 200e-6 * (power_w(rows[k - 1].truth) + power_w(rows[k].truth));
@@ -123,7 +123,7 @@ TEST(SimulatedMachine, TurnsTheTorqueLeftOverIntoKineticEnergy) {
 
 TEST(SimulatedMachine, KeepsInputPowerEqualToLossesAndAirGapAtAPlateau) {
   const auto rows = run_open_loop(loaded_motor_a(), 1.58);
-  const Truth& t = rows.back().truth;
+  const MachineTruth& t = rows.back().truth;
   double copper_w = 0.0;
   double input_w = 0.0;
   int count = 0;
@@ -192,7 +192,7 @@ TEST(SimulatedMachine, DrawsItsRatedCurrentAndSlipAtItsRatedTorque) {
     config.drive.speed_reference_rad_s = Profile{{0.0, 0.0}, {0.2, 0.0}, {1.4, 120.0}};
     config.load.torque_nm = ramped_steps(0.0, {{2.0, config.motor.rated_torque_nm}}, 0.03);
     const auto rows = run_open_loop(config, 3.5);
-    const Truth& t = rows.back().truth;
+    const MachineTruth& t = rows.back().truth;
     EXPECT_NEAR(magnitude(host_tests::current_of(rows.back().sample)) / std::sqrt(2.0),
                 config.motor.rated_current_a_rms, 0.1 * config.motor.rated_current_a_rms);
     // At 120 rad/s the field is whole: the rated slip in rad/s is that of the rated speed.
@@ -416,7 +416,7 @@ TEST(SimulationPort, ClosesTheLoopOnTheForce) {
   std::int64_t tick = 1;
   while (const auto count = port.read(block).value()) {
     const Sample& last = block[count - 1];
-    const Truth& truth = machine.truth();
+    const MachineTruth& truth = machine.truth();
     if (truth.depth_m > 0.0 && last.time_ns > 5'000'000'000) {
       highest = std::max(highest, truth.cutting_force_n);
       lowest = std::min(lowest, truth.cutting_force_n);

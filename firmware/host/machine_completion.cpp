@@ -109,27 +109,51 @@ void derive(MachineFile& file, std::vector<std::string>& warnings) {
   if (const auto warning = poles_warning(file, file.machine)) warnings.push_back(*warning);
 }
 
-// A recording may be slower than the usual estimate period: the shortest that fits both.
-void fit_estimate_period(MachineFile& file, std::vector<std::string>& warnings) {
-  Machine& machine = file.machine;
-  if (file.is_given("estimate_period_s") || machine.sample_rate_hz == 0.0F) return;
-  if (is_refused(file, "estimate_period_s") || is_refused(file, "sample_rate_hz")) return;
-  const float usual_s = machine.estimate_period_s;
+// The shortest estimate period from the usual one on that is whole samples long and fits the control
+// period; none within it.
+std::optional<float> fitting_estimate_period_s(const Machine& machine) {
   for (int samples = 1; samples <= 1000; ++samples) {
-    machine.estimate_period_s = static_cast<float>(samples) / machine.sample_rate_hz;
-    if (machine.estimate_period_s < 0.999F * usual_s) continue;
-    if (machine.estimate_period_s > machine.control_period_s * 1.001F) break;
-    if (!detail::is_multiple(machine.control_period_s, machine.estimate_period_s)) continue;
-    if (std::fabs(machine.estimate_period_s / usual_s - 1.0F) < 1e-3F)
-      machine.estimate_period_s = usual_s;
-    if (machine.estimate_period_s != usual_s) {
-      warnings.push_back(
-          "estimate_period_s is not given: " + rounded_text(machine.estimate_period_s) +
-          " s fits sample rate and control period");
-    }
-    return;
+    const float period_s = static_cast<float>(samples) / machine.sample_rate_hz;
+    if (period_s < 0.999F * machine.estimate_period_s) continue;
+    if (period_s > machine.control_period_s * 1.001F) break;
+    if (detail::is_multiple(machine.control_period_s, period_s)) return period_s;
   }
-  machine.estimate_period_s = usual_s;
+  return std::nullopt;
+}
+
+std::string period_warning(std::string_view key, float period_s) {
+  return std::string(key) + " is not given: " + rounded_text(period_s) +
+         " s fits the sample rate; give another in section [estimator]";
+}
+
+// A recording may be slower than the usual estimate period, and no whole number of its samples need
+// fit the usual control period: what nobody demanded gives way.
+void fit_periods(MachineFile& file, std::vector<std::string>& warnings) {
+  Machine& machine = file.machine;
+  if (machine.sample_rate_hz == 0.0F) return;
+  for (const auto key : {"estimate_period_s", "control_period_s", "sample_rate_hz"}) {
+    if (is_refused(file, key)) return;
+  }
+  const bool control_demanded = file.is_given("control_period_s");
+  const float usual_s = machine.estimate_period_s;
+  const float usual_control_s = machine.control_period_s;
+  if (!file.is_given("estimate_period_s")) {
+    const auto fitting = fitting_estimate_period_s(machine);
+    if (!fitting && control_demanded) return;
+    const float samples = std::max(std::round(usual_s * machine.sample_rate_hz), 1.0F);
+    machine.estimate_period_s = fitting.value_or(samples / machine.sample_rate_hz);
+    if (std::fabs(machine.estimate_period_s / usual_s - 1.0F) < 1e-3F) {
+      machine.estimate_period_s = usual_s;
+    }
+    if (machine.estimate_period_s != usual_s) {
+      warnings.push_back(period_warning("estimate_period_s", machine.estimate_period_s));
+    }
+  }
+  if (control_demanded || detail::is_multiple(usual_control_s, machine.estimate_period_s)) return;
+  const float estimates =
+      std::max(std::round(usual_control_s / machine.estimate_period_s), 1.0F);
+  machine.control_period_s = estimates * machine.estimate_period_s;
+  warnings.push_back(period_warning("control_period_s", machine.control_period_s));
 }
 
 void check_rules(MachineFile& file) {
@@ -157,7 +181,7 @@ std::expected<LoadedMachine, std::vector<InputError>> complete(MachineFile file)
   if (file.unreadable) return std::unexpected{std::move(file.errors)};
   std::vector<std::string> warnings;
   derive(file, warnings);
-  fit_estimate_period(file, warnings);
+  fit_periods(file, warnings);
   check_rules(file);
   if (!file.errors.empty()) return std::unexpected{std::move(file.errors)};
   const Machine& machine = file.machine;

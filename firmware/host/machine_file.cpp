@@ -132,11 +132,19 @@ TextValue values_from_text(const Parameter& parameter, std::string_view text) {
 }
 
 void fill(MachineFile& file, TomlDocument& document) {
+  fill_sections(file, document.root(), [](Section) { return true; });
+  file.errors = document.finish();
+}
+
+}  // namespace
+
+void fill_sections(MachineFile& file, TomlSection root, bool (*wanted)(Section)) {
   std::optional<Section> open;
   std::optional<TomlSection> section;
   for (std::size_t k = 0; k < kParameters.size(); ++k) {
     const Parameter& parameter = kParameters[k];
-    if (open != parameter.section) section = document.section(name_of(parameter.section));
+    if (!wanted(parameter.section)) continue;
+    if (open != parameter.section) section = root.section(name_of(parameter.section));
     open = parameter.section;
     if (!section->has(parameter.key)) continue;
     const std::vector<float> values = values_from(*section, parameter);
@@ -146,10 +154,7 @@ void fill(MachineFile& file, TomlDocument& document) {
       give(file, k, values, section->where(parameter.key));
     }
   }
-  file.errors = document.finish();
 }
-
-}  // namespace
 
 bool MachineFile::is_given(std::string_view key) const {
   const auto index = find_parameter(key);

@@ -39,6 +39,10 @@ struct MachineFile {
 [[nodiscard]] MachineFile read_machine_file(const std::filesystem::path& path);
 [[nodiscard]] MachineFile parse_machine_text(std::string_view text, std::string name);
 
+// The wanted sections of a machine file that stand below `root`. Errors stay with its document.
+class TomlSection;
+void fill_sections(MachineFile& file, TomlSection root, bool (*wanted)(Section));
+
 // One value from outside the file, as text: a number, three numbers, true or false, or a name.
 struct RecordedValue {
   std::string_view key;

@@ -1,1 +1,3 @@
-int main() { return 0; }
+#include "firmware/host/commands/command.hpp"
+
+int main(int argc, char** argv) { return cutforce::firmware::host::run_program(argc, argv); }

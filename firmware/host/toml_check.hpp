@@ -34,6 +34,10 @@ struct NumberRule {
   std::string_view zero_means = {};  // not empty: 0 is allowed too, and means this
   bool whole = false;
 };
+struct CurvePoint {
+  float at;
+  float value;
+};
 // "0.1 to 20 ohm, or 0 (derived)".
 [[nodiscard]] std::string range_text(const NumberRule& rule);
 
@@ -49,6 +53,11 @@ class TomlSection {
   // As many numbers as `count`; a single number stands for all of them. count 0: any number, >= 1.
   [[nodiscard]] std::optional<std::vector<float>> numbers(std::string_view key, std::size_t count,
                                                           const NumberRule& rule);
+  // A curve: points [[at, value], ...], `at` not decreasing; a single number is a constant. `over`
+  // names the abscissa's unit.
+  [[nodiscard]] std::optional<std::vector<CurvePoint>> curve(std::string_view key,
+                                                             const NumberRule& rule,
+                                                             std::string_view over);
   [[nodiscard]] std::optional<std::int64_t> whole(std::string_view key, std::int64_t minimum,
                                                   std::int64_t maximum);
   [[nodiscard]] std::optional<bool> flag(std::string_view key);

@@ -176,6 +176,45 @@ std::optional<std::vector<float>> TomlSection::numbers(std::string_view key, std
   return values;
 }
 
+std::optional<std::vector<CurvePoint>> TomlSection::curve(std::string_view key,
+                                                          const NumberRule& rule,
+                                                          std::string_view over) {
+  constexpr NumberRule kAbscissa{.minimum = -1e9F, .maximum = 1e9F};
+  Access access(*this);
+  const toml::node* node = access.look_up(*this, key);
+  if (node == nullptr) return std::nullopt;
+  if (node->is_number()) {
+    const auto value = access.checked(key, *node, rule);
+    if (!value) return std::nullopt;
+    return std::vector<CurvePoint>{{.at = 0.0F, .value = *value}};
+  }
+  const std::string remedy = "give a number, or points [[" + std::string(over) + ", " +
+                             (rule.unit.empty() ? "ratio" : std::string(rule.unit)) +
+                             "], ...], the first of each not decreasing, at most two alike";
+  const toml::array* array = node->as_array();
+  std::vector<CurvePoint> points;
+  for (std::size_t k = 0; array != nullptr && k < array->size(); ++k) {
+    const toml::array* pair = array->get(k)->as_array();
+    if (pair == nullptr || pair->size() != 2) break;
+    const auto at = access.checked(key, *pair->get(0), kAbscissa);
+    const auto value = access.checked(key, *pair->get(1), rule);
+    if (!at || !value) return std::nullopt;
+    const std::size_t n = points.size();
+    const bool third = n > 1 && points[n - 2].at == *at;
+    if (third || (n > 0 && *at < points[n - 1].at)) {
+      access.contents.refuse(pair->source().begin, std::string(key) + " does not go forward here",
+                             remedy);
+      return std::nullopt;
+    }
+    points.push_back({.at = *at, .value = *value});
+  }
+  if (array == nullptr || points.empty() || points.size() != array->size()) {
+    access.contents.refuse(node->source().begin, std::string(key) + " is no curve", remedy);
+    return std::nullopt;
+  }
+  return points;
+}
+
 std::optional<std::int64_t> TomlSection::whole(std::string_view key, std::int64_t minimum,
                                                std::int64_t maximum) {
   Access access(*this);

@@ -13,12 +13,10 @@
 
 #include "hal/host/input_error.hpp"
 #include "hal/host/truth.hpp"
+#include "hal/host/voltage_kind.hpp"
 #include "hal/port.hpp"
 
 namespace cutforce::hal::host {
-
-// Same meaning and order as firmware::VoltageKind, which hal may not see.
-enum class VoltageKind : std::uint8_t { kLineToNeutral, kLineToLine };
 
 // One `# key: value` line.
 struct Metadata {

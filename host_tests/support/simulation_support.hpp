@@ -14,7 +14,7 @@ namespace cutforce::host_tests {
 // One delivered sample and what was true at that instant.
 struct Row {
   hal::Sample sample;
-  hal::host::Truth truth;
+  hal::host::MachineTruth truth;
 
   [[nodiscard]] double time_s() const { return static_cast<double>(sample.time_ns) * 1e-9; }
 };

@@ -10,10 +10,10 @@
 #include "hal/host/simulation/arithmetic.hpp"
 #include "hal/host/simulation/delay_line.hpp"
 #include "hal/host/simulation/random.hpp"
+#include "hal/host/voltage_kind.hpp"
 
 namespace cutforce::hal::host {
 
-enum class VoltageKind : std::uint8_t { kLineToNeutral, kLineToLine };
 // What the voltage channel shows. kMean: mean over one hold centred on the sample, aligned with
 // the instantaneous current. kReference: what the drive asked for in the hold that begins now or
 // began last (without dead time and drops). kInstantaneous: the terminals themselves, raw

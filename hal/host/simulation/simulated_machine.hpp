@@ -17,7 +17,7 @@
 
 namespace cutforce::hal::host {
 
-struct Truth {
+struct MachineTruth {
   std::int64_t time_ns;
   double airgap_torque_nm;
   double load_torque_nm;      // all that loads the motor: cut, friction; not inertia
@@ -46,7 +46,7 @@ class SimulatedMachine {
   void set_override(double percent) noexcept { feed_.set_override(percent); }
 
   // Of the sample that advance() returned last.
-  [[nodiscard]] const Truth& truth() const noexcept { return truth_; }
+  [[nodiscard]] const MachineTruth& truth() const noexcept { return truth_; }
   [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }
   [[nodiscard]] const SimulatedMachineConfig& config() const noexcept { return config_; }
 
@@ -101,7 +101,7 @@ class SimulatedMachine {
   bool has_voltages_ = false;
   bool has_rest_ = false;
   Sample sample_{};
-  Truth truth_{};
+  MachineTruth truth_{};
 };
 
 }  // namespace cutforce::hal::host

@@ -1,0 +1,130 @@
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "firmware/host/commands/command.hpp"
+#include "firmware/host/commands/progress.hpp"
+#include "firmware/host/run/simulate.hpp"
+
+namespace cutforce::firmware::host {
+namespace {
+
+// P3's own, beside which the run's estimator is shown.
+constexpr EstimatorName kPublished[] = {EstimatorName::kComputed, EstimatorName::kSynthesized,
+                                        EstimatorName::kMeasured};
+
+struct Options {
+  std::string scenario;
+  std::string out;
+  std::string recording;
+  bool compare = false;
+  bool make_template = false;
+  bool scenario_text = false;
+  bool json = false;
+};
+
+Exit show(const SimulationResult& result, const Options& options) {
+  if (options.json) {
+    auto json = summary_json(result.summary);
+    json["report"] = result.report.string();
+    std::cout << json.dump(2) << "\n";
+  } else {
+    show_warnings(result.summary.warnings);
+    std::cout << result.summary.title << "\n\n" << figure_text(result.summary.figures);
+    if (!result.summary.verdict.empty()) std::cout << "\n" << result.summary.verdict << "\n";
+    std::cout << "\nreport: " << result.report.string() << "\n";
+  }
+  return result.refused ? Exit::kFailed : Exit::kDone;
+}
+
+Exit run_scenario(const Scenario& scenario, const Options& options) {
+  catch_stop_signals();
+  if (!options.recording.empty()) {
+    const auto made = simulate_recording(scenario, options.recording);
+    return made ? Exit::kDone : refuse(made.error());
+  }
+  const std::span<const EstimatorName> none;
+  const auto result =
+      simulate(scenario, options.out, options.compare ? std::span(kPublished) : none);
+  return result ? show(*result, options) : refuse(result.error());
+}
+
+Exit perform_simulate(Options options) {
+  if (options.make_template) {
+    std::cout << scenario_template(Preset::kLathe);
+    return Exit::kDone;
+  }
+  if (options.scenario.empty()) {
+    return refuse(
+        InputError{"SCENARIO", "no scenario is named", "name a file, or ask for --template"});
+  }
+  const auto scenario = read_scenario(options.scenario);
+  if (!scenario) return refuse(scenario.error());
+  if (options.out.empty()) {
+    options.out = "out/" + std::filesystem::path(options.scenario).stem().string();
+  }
+  return run_scenario(*scenario, options);
+}
+
+Exit perform_demo(Options options) {
+  if (options.scenario_text) {
+    std::cout << demo_scenario_text();
+    return Exit::kDone;
+  }
+  const auto scenario = parse_scenario(demo_scenario_text(), "demo");
+  if (!scenario) return refuse(scenario.error());
+  options.compare = true;
+  return run_scenario(*scenario, options);
+}
+
+}  // namespace
+
+void add_demo(CLI::App& program, Action& action) {
+  auto* command = program.add_subcommand(
+      "demo", "The main job with nothing to prepare: a simulated lathe in closed loop");
+  auto options = std::make_shared<Options>();
+  options->out = "out/demo";
+  command->add_option("--out", options->out, "Folder for the files of the run")
+      ->type_name("DIR")
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "Print the summary as JSON");
+  command->add_flag("--scenario", options->scenario_text, "Print the demo's scenario instead");
+  command->footer(R"(A 5.5 kW lathe turns; the tool enters at 1 mm depth of cut, and the depth steps to 1.5 mm. The loop
+estimates the cutting force from voltages, currents and speed, and holds it by the feed override.
+
+Examples:
+  cutforce demo
+  cutforce demo --scenario > mine.toml; cutforce simulate mine.toml)");
+  command->callback([options, &action] { action = [options] { return perform_demo(*options); }; });
+}
+
+void add_simulate(CLI::App& program, Action& action) {
+  auto* command =
+      program.add_subcommand("simulate", "A scenario in closed loop: recording, trace, report");
+  auto options = std::make_shared<Options>();
+  command->add_option("SCENARIO", options->scenario, "Scenario file (TOML)");
+  command->add_option("--out", options->out,
+                      "Folder for the files of the run; left out: out/ and the scenario's name")
+      ->type_name("DIR");
+  command->add_option("--recording", options->recording,
+                      "Write only the recording, to this file (.csv, .csv.gz, .cfr)")
+      ->type_name("FILE");
+  command->add_flag("--compare", options->compare,
+                    "Also the estimators computed, synthesized and measured on the same samples");
+  command->add_flag("--template", options->make_template,
+                    "Print a commented scenario with every key instead");
+  command->add_flag("--json", options->json, "Print the summary as JSON");
+  command->footer(R"(Examples:
+  cutforce simulate --template > mine.toml
+  cutforce simulate mine.toml --out out/mine --compare
+  cutforce simulate host_tests/scenarios/vhz.toml --recording vhz.csv.gz
+
+The same scenario gives the same files, bit for bit.)");
+  command->callback(
+      [options, &action] { action = [options] { return perform_simulate(*options); }; });
+}
+
+}  // namespace cutforce::firmware::host

@@ -1,0 +1,214 @@
+#include "firmware/host/scenario/scenario.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <optional>
+#include <utility>
+
+#include "firmware/host/number_text.hpp"
+#include "firmware/host/scenario/scenario_table.hpp"
+#include "firmware/host/toml_check.hpp"
+
+namespace cutforce::firmware::host {
+namespace {
+
+using hal::Signal;
+using hal::host::SignalFaultKind;
+
+constexpr std::array<std::string_view, 3> kPresets{"lathe", "motor_a", "motor_b"};
+constexpr std::array<std::string_view, 6> kFaultKinds{"gap",     "stuck",    "lost",
+                                                      "swapped", "inverted", "absent"};
+// In the order of enum Signal.
+constexpr std::array<std::string_view, 8> kChannels{"voltage_u", "voltage_v", "voltage_w",
+                                                    "current_u", "current_v", "current_w",
+                                                    "speed",     "power_meter"};
+constexpr float kLongestRunS = 36000.0F;
+
+// The number that the person wrote: 0.0002, not the float nearest to it.
+double as_written(float value) {
+  const std::string text = number_text(value);
+  double number = 0.0;
+  std::from_chars(text.data(), text.data() + text.size(), number);
+  return number;
+}
+
+struct Reader {
+  Simulation& simulation;
+  TomlSection& section;
+  const ScenarioKey& key;
+
+  [[nodiscard]] NumberRule rule() const {
+    return {.minimum = key.minimum, .maximum = key.maximum, .unit = key.unit};
+  }
+  void operator()(NumberAt at) const {
+    if (const auto value = section.number(key.key, rule())) at(simulation) = as_written(*value);
+  }
+  void operator()(FlagAt at) const {
+    if (const auto value = section.flag(key.key)) at(simulation) = *value;
+  }
+  void operator()(const ChoiceAt& at) const {
+    if (const auto value = section.choice(key.key, at.names)) at.set(simulation, *value);
+  }
+  void operator()(ProfileAt at) const {
+    const auto curve = section.curve(key.key, rule(), key.over);
+    if (!curve) return;
+    std::vector<hal::host::ProfilePoint> points;
+    for (const CurvePoint& point : *curve) {
+      points.push_back({as_written(point.at), as_written(point.value)});
+    }
+    at(simulation) = hal::host::Profile(std::move(points));
+  }
+  void operator()(const ChannelAt& at) const {
+    const auto values = section.numbers(key.key, 3, rule());
+    if (!values) return;
+    for (std::size_t k = 0; k < 3; ++k) {
+      at.channels(simulation)[k].*at.value = as_written((*values)[k]);
+    }
+  }
+};
+
+// "sensors.speed" is a section within a section.
+TomlSection section_at(TomlDocument& document, std::string_view path) {
+  TomlSection section = document.root();
+  while (!path.empty()) {
+    const std::size_t dot = path.find('.');
+    section = section.section(path.substr(0, dot));
+    path = dot == std::string_view::npos ? std::string_view{} : path.substr(dot + 1);
+  }
+  return section;
+}
+
+double required(TomlSection& section, std::string_view key, const NumberRule& rule) {
+  section.require(key, "give " + range_text(rule));
+  return as_written(section.number(key, rule).value_or(rule.minimum));
+}
+
+void read_lists(TomlDocument& document, Simulation& simulation) {
+  const NumberRule time{.minimum = 0, .maximum = kLongestRunS, .unit = "s"};
+  const NumberRule place{.minimum = 0, .maximum = 1e4F, .unit = "m"};
+  for (TomlSection& spot : section_at(document, "process").sections("hard_spots")) {
+    simulation.process.hard_spots.push_back(
+        {.begin_m = required(spot, "begin_m", place),
+         .end_m = required(spot, "end_m", place),
+         .factor = required(spot, "factor", {.minimum = 0, .maximum = 100})});
+  }
+  for (TomlSection& wave : section_at(document, "load").sections("oscillations")) {
+    simulation.load.oscillations.push_back(
+        {.begin_s = required(wave, "begin_s", time),
+         .end_s = required(wave, "end_s", time),
+         .amplitude_nm =
+             required(wave, "amplitude_nm", {.minimum = 0, .maximum = 1e6F, .unit = "N m"}),
+         .frequency_hz =
+             required(wave, "frequency_hz", {.minimum = 0, .maximum = 1e4F, .unit = "Hz"})});
+  }
+  for (TomlSection& entry : document.root().sections("faults")) {
+    hal::host::SignalFault fault{};
+    entry.require("kind", "give what goes wrong");
+    fault.kind = static_cast<SignalFaultKind>(entry.choice("kind", kFaultKinds).value_or(0));
+    if (const auto begin = entry.number("begin_s", time)) fault.begin_s = as_written(*begin);
+    if (const auto end = entry.number("end_s", time)) fault.end_s = as_written(*end);
+    const bool gap = fault.kind == SignalFaultKind::kGap;
+    if (gap) entry.require("end_s", "a gap has an end: give it in s");
+    if (!gap) entry.require("channel", "give the channel that it happens to");
+    fault.channel = static_cast<Signal>(entry.choice("channel", kChannels).value_or(0));
+    if (fault.kind == SignalFaultKind::kSwapped) entry.require("other", "give the other channel");
+    fault.other = static_cast<Signal>(entry.choice("other", kChannels).value_or(0));
+    if (!(fault.end_s > fault.begin_s)) {
+      entry.refuse("end_s", "the fault ends before it begins", "give end_s above begin_s");
+    }
+    simulation.faults.push_back(fault);
+  }
+}
+
+// Errors of the simulation's own check name a key, which the document can place.
+InputError placed(TomlDocument& document, const InputError& error) {
+  const std::size_t dot = error.where.rfind('.');
+  const bool in_section = dot != std::string::npos;
+  std::string key = in_section ? error.where.substr(dot + 1) : error.where;
+  if (const std::size_t bracket = key.find('['); bracket != std::string::npos) key.resize(bracket);
+  const std::string path = in_section ? error.where.substr(0, dot) : std::string();
+  TomlSection section = section_at(document, error.where == "friction_ratio" ? "spindle" : path);
+  return {section.where(key), error.where + " " + error.what, error.remedy};
+}
+
+void read_simulation(TomlDocument& document, Scenario& scenario) {
+  std::string_view open = "?";
+  std::optional<TomlSection> section;
+  for (const ScenarioKey& key : scenario_keys()) {
+    if (key.section != open) section = section_at(document, key.section);
+    open = key.section;
+    std::visit(Reader{scenario.simulation, *section, key}, key.at);
+  }
+  read_lists(document, scenario.simulation);
+  // A feed given in the other way takes the preset's place.
+  TomlSection feed = document.section("feed");
+  if (feed.has("feed_m_s") && !feed.has("feed_m_rev")) scenario.simulation.feed.feed_m_rev = 0.0;
+  TomlSection machine = document.root();
+  if (const auto seed = machine.whole("seed", 1, 2147483647)) {
+    scenario.simulation.seed = static_cast<std::uint64_t>(*seed);
+  }
+}
+
+std::expected<Scenario, std::vector<InputError>> read(TomlDocument& document, std::string name) {
+  Scenario scenario{};
+  TomlSection root = document.root();
+  scenario.title = root.text("title").value_or("Simulated run");
+  scenario.preset = static_cast<Preset>(root.choice("preset", kPresets).value_or(0));
+  scenario.simulation = simulation_of(scenario.preset);
+  scenario.duration_s = required(
+      root, "duration_s", {.minimum = 0.01F, .maximum = kLongestRunS, .unit = "s"});
+  read_simulation(document, scenario);
+
+  MachineFile believed{};
+  believed.name = name;
+  const auto controls = [](Section s) { return s >= Section::kEstimator; };
+  const auto others = [](Section s) { return s < Section::kEstimator; };
+  believed.machine = machine_of(scenario.simulation, scenario.preset);
+  for (std::size_t k = 0; k < kParameters.size(); ++k) {
+    if (kParameters[k].section < Section::kEstimator) believed.where[k] = name;
+  }
+  fill_sections(believed, root, controls);
+  fill_sections(believed, root.section("believed"), others);
+
+  std::vector<InputError> errors = document.finish();
+  if (errors.empty()) {
+    if (const auto checked = scenario.simulation.check(); !checked) {
+      errors.push_back(placed(document, checked.error()));
+    }
+  }
+  if (!errors.empty()) return std::unexpected{std::move(errors)};
+  auto loaded = complete(std::move(believed));
+  if (!loaded) return std::unexpected{std::move(loaded.error())};
+  scenario.machine = loaded->machine;
+  scenario.warnings = std::move(loaded->warnings);
+  return scenario;
+}
+
+}  // namespace
+
+std::expected<Scenario, std::vector<InputError>> read_scenario(const std::filesystem::path& path) {
+  auto document = TomlDocument::read(path);
+  if (!document) return std::unexpected{std::vector{document.error()}};
+  return read(**document, path.string());
+}
+
+std::expected<Scenario, std::vector<InputError>> parse_scenario(std::string_view text,
+                                                                std::string name) {
+  auto document = TomlDocument::parse(text, name);
+  if (!document) return std::unexpected{std::vector{document.error()}};
+  return read(**document, std::move(name));
+}
+
+bool is_scenario(const std::filesystem::path& path) {
+  const auto document = TomlDocument::read(path);
+  if (!document) return false;
+  TomlSection root = (*document)->root();
+  // The others are sections of a machine file too.
+  constexpr std::array<std::string_view, 12> kOwn{
+      "title", "preset", "duration_s", "seed", "sample_rate_hz", "inverter",
+      "drive", "process", "feed",      "load", "sensors",        "believed"};
+  return std::ranges::any_of(kOwn, [&](std::string_view key) { return root.has(key); });
+}
+
+}  // namespace cutforce::firmware::host

@@ -1,0 +1,57 @@
+// A scenario: a simulated machine, what it does, how long, and what the firmware believes of it.
+// A person writes it as TOML, on top of a preset; the firmware's machine follows from the simulated
+// one as a faultless commissioning would find it, and [believed.*] says where that is wrong.
+//
+//   auto scenario = read_scenario(path);          // or every error, with line, column and remedy
+//   auto machine = SimulatedMachine::make(scenario->simulation);
+#pragma once
+
+#include <cstdint>
+#include <expected>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "firmware/host/machine_file.hpp"
+#include "firmware/machine.hpp"
+#include "hal/host/input_error.hpp"
+#include "hal/host/simulation/machine_config.hpp"
+
+namespace cutforce::firmware::host {
+
+enum class Preset : std::uint8_t { kLathe, kMotorA, kMotorB };
+
+struct Scenario {
+  std::string title;
+  Preset preset;
+  double duration_s;
+  hal::host::SimulatedMachineConfig simulation;
+  Machine machine;                    // what the firmware is given; complete and checked
+  std::vector<std::string> warnings;  // one line each
+};
+
+[[nodiscard]] hal::host::SimulatedMachineConfig simulation_of(Preset preset);
+
+// The firmware's parameters of a simulated machine: star-equivalent inverse-Gamma values at rated
+// flux, friction at the support speeds, and the sensors that are there. Control and estimation stay
+// the default machine's.
+[[nodiscard]] Machine machine_of(const hal::host::SimulatedMachineConfig& simulation,
+                                 Preset preset);
+
+[[nodiscard]] std::expected<Scenario, std::vector<InputError>> read_scenario(
+    const std::filesystem::path& path);
+[[nodiscard]] std::expected<Scenario, std::vector<InputError>> parse_scenario(
+    std::string_view text, std::string name);
+
+// Whether a TOML file holds a scenario, not a machine: by the keys before and of its sections. No
+// scenario where it cannot be read.
+[[nodiscard]] bool is_scenario(const std::filesystem::path& path);
+
+// A commented file with every key, of the preset's values.
+[[nodiscard]] std::string scenario_template(Preset preset);
+
+// The demo: a step in depth of cut from 1 to 1.5 mm on the default lathe.
+[[nodiscard]] std::string_view demo_scenario_text();
+
+}  // namespace cutforce::firmware::host
