@@ -117,7 +117,7 @@ void NoiseMeter::close_block(bool of_speed) noexcept {
   const Differences d = s.block;
   s.block = {};
   s.filled = 0;
-  s.loud = d.e0 * kShare > kLoud_ratio * s.mean.e0 ? s.loud + 1 : 0;
+  if (of_speed) s.loud = d.e0 * kShare > kLoud_ratio * s.mean.e0 ? s.loud + 1 : 0;
   const bool first = s.blocks == 0 || s.loud >= kLastingLoud;
   if (first) s.blocks = s.loud = 0;
   if (s.blocks < kMostBlocks && of_speed) ++s.blocks;
