@@ -51,7 +51,7 @@ void StatorResistance::step(const Input& in) noexcept {
   s[1] += (in.flux_frequency_rad_s - config_.pole_pairs * in.speed_rad_s) * in.duration_s;
   s[2] += in.torque_nm * in.duration_s;
   s[3] += x * in.duration_s;
-  s[4] += (w < 0.0F ? -w : w) * in.duration_s;
+  s[4] += w * in.duration_s;
   s[5] += in.duration_s;
   if (s[5] >= kBlock_s) {
     learn();
@@ -68,7 +68,9 @@ void StatorResistance::learn() noexcept {
   // The copper term must stand out of what the iron loss may be.
   const float copper = config_.resistance_sigma_ratio * config_.stator_resistance_ohm * x;
   const float magnitude = copper < 0.0F ? -copper : copper;
-  if (!(magnitude > kStandsOut_sigmas * config_.iron_torque_sigma_nm * speed_ratio)) return;
+  const float iron =
+      config_.iron_torque_sigma_nm * (speed_ratio < 0.0F ? -speed_ratio : speed_ratio);
+  if (!(magnitude > kStandsOut_sigmas * iron)) return;
 
   const float flux2 = s[0] / s[5];
   const float y = flux2 * s[1] / s[5];
