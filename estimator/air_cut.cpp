@@ -15,6 +15,9 @@ constexpr float kNoiseWait_s = 0.15F;
 constexpr float kNoisySpeed_rad_s = 0.2F;
 constexpr float kTorqueFloor_ratio = 1e-3F;
 constexpr float kTareSigma_ratio = 0.02F;
+constexpr float kSettled_s = 0.5F;
+constexpr float kDrift_ratio_s = 0.004F;
+constexpr float kLongestWait_s = 1.2F;
 constexpr float kYoungTare_s = 0.06F;
 constexpr float kLargestThreshold_ratio = 0.06F;
 constexpr float kAging_ratio_sqrt_s = 5e-4F;  // friction drifts between tare and cut
@@ -40,7 +43,13 @@ void AirCut::tare(float y_nm, float variance_nm2, float duration_s) noexcept {
   const float floor_nm = kTorqueFloor_ratio * config_.rated_torque_nm;
   const float weight = 1.0F / (variance_nm2 + floor_nm * floor_nm);
   state_.tare_weight = (1.0F - duration_s / kTareTime_s) * state_.tare_weight + weight;
-  state_.tare_nm += deviation * weight / state_.tare_weight;  // (E91)
+  float moved = deviation * weight / state_.tare_weight;  // (E91)
+  if (state_.idle_s > kSettled_s) {
+    // Friction drifts slowly; what is faster is a cut that begins gently.
+    const float most = kDrift_ratio_s * config_.rated_torque_nm * duration_s;
+    moved = moved > most ? most : (moved < -most ? -most : moved);
+  }
+  state_.tare_nm += moved;
   state_.variance_nm2 += share * (deviation * deviation - state_.variance_nm2);
   state_.has_tare = 1;
   state_.tare_age_s = 0.0F;
@@ -92,7 +101,9 @@ auto AirCut::decide(const Input& input, float y_nm, float slope_nm, float sign) 
   if (!waited) return Phase::kUnsteady;
   if (state_.has_tare == 0) {
     // Not before the load torque is known well enough to be a tare.
-    if (!(input.sigma_nm < kTareSigma_ratio * rated)) return Phase::kUnsteady;
+    if (!(input.sigma_nm < kTareSigma_ratio * rated) && state_.even_s < kLongestWait_s) {
+      return Phase::kUnsteady;
+    }
     // No cut drives the spindle: less than nominal friction is friction or a wrong parameter.
     const float believed = config_.friction_limit_ratio * rated;
     const float most = believed + input.model_sigma_nm;
@@ -138,6 +149,7 @@ auto AirCut::step(const Input& input) noexcept -> Output {
       state_.idle_s = 0.0F;
     }
     if (now == Phase::kCut) state_.was_cut = 1;
+    if (now == Phase::kCut && before != Phase::kCut) state_.steady_s = 0.0F;
     if (now == Phase::kIdle) {
       state_.was_cut = 0;
       if (before != Phase::kIdle && state_.has_tare != 0 && input.feed == Feed::kUnknown) {

@@ -5,7 +5,7 @@ namespace {
 
 constexpr float kExplainTime_s = 0.1F;
 constexpr float kSpeedFloor_rad_s = 3e-5F;                // rounding of a recorded speed
-constexpr float kFluxFloor_rad_s = 0.01F;                 // the flux angle is no better
+constexpr float kFluxFloor_rad_s = 0.02F;                 // the flux angle is no better
 constexpr std::uint32_t kHistory = 2 * NoiseMeter::kLag;  // ticks until the differences are filled
 constexpr std::uint32_t kBlock = 50;                      // ticks
 constexpr std::uint32_t kMostBlocks = 16;

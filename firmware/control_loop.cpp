@@ -240,7 +240,7 @@ void ControlLoop::calibrate(const estimator::FusedObserver::Output& fused) noexc
 void ControlLoop::estimate_fused(LoopOutput& out) noexcept {
   const AirCut::Feed feed = own_.feed == 1 ? AirCut::Feed::kIdle : AirCut::Feed::kUnknown;
   const estimator::FusedObserver::Output fused = fused_.tick(feed);
-  own_.frequency_rad_s = fused.frequency_rad_s;
+  own_.frequency_rad_s = fused.valid ? fused.frequency_rad_s : 0.0F;
   if (config_.voltage_lead_s != 0.0F) {
     const float angle = fused.frequency_rad_s * config_.voltage_lead_s;
     front_end_.set_rotation(estimator::cos_small(angle), estimator::sin_small(angle));
