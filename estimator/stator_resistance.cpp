@@ -61,7 +61,7 @@ void StatorResistance::step(const Input& in) noexcept {
   s[1] += (in.flux_frequency_rad_s - config_.pole_pairs * in.speed_rad_s) * in.duration_s;
   s[2] += in.torque_nm * in.duration_s;
   s[3] += x * in.duration_s;
-  s[4] += (w < 0.0F ? -w : w) * in.duration_s;
+  s[4] += w * in.duration_s;
   s[5] += in.duration_s;
   if (s[5] >= kBlock_s) {
     learn();

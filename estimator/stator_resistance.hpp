@@ -1,6 +1,6 @@
 // Stator resistance on line, from the consistency of slip and torque.
 //
-//   |psi_R|^2 w_sl = A T - (A dR) x - A T_fe |w_e|/w_n,   x = 1.5 |i|^2 p / w_e,
+//   |psi_R|^2 w_sl = A T - (A dR) x - A T_fe w_e/w_n,   x = 1.5 |i|^2 p / w_e,
 //   A = R_R / (1.5 p)                                                                       (E110)
 // with w_sl = mean(w_psi) - p mean(w), T the torque computed with the resistance in use, dR the
 // true resistance less that, T_fe the torque of the iron loss at rated frequency w_n. Means of 50
@@ -61,7 +61,7 @@ class StatorResistance {
   struct State {
     std::array<float, 3> mean{};
     std::array<float, 6> covariance{};  // 00 01 02 11 12 22
-    std::array<float, 6> sums{};        // flux2, slip, torque, x, |w_e|, time
+    std::array<float, 6> sums{};        // flux2, slip, torque, x, w_e, time
     float first_torque_nm = 0.0F;
     float last_rest = 0.0F;    // what the block before left unexplained
     float scatter = 0.0F;      // variance of a block, from the changes of that
