@@ -18,6 +18,7 @@ constexpr float kUsualResistance_ratio = 0.1F;  // what temperature does to copp
 constexpr float kLate_ticks = 0.7F;
 constexpr float kFading_ratio = 0.8F;
 constexpr float kConsistencyShare = 0.02F;
+constexpr float kAveragedTare_s = 0.05F;
 constexpr float kEvenTurns = 1.5F;
 constexpr float kUncalibrated_ratio = 0.03F;
 constexpr float kTareFollow_ratio = 0.02F;  // of what the tare belongs to, each tick
@@ -215,7 +216,8 @@ auto FusedObserver::unlocked(float speed_rad_s, AirCut::Feed feed, Output out) n
                  .speed_rad_s = 0.0F,
                  .duration_s = out.duration_s,
                  .valid = false,
-                 .tared = false,
+                 .idle = false,
+                 .in_cut = false,
                  .tare_nm = 0.0F});
   out.valid = false;
   out.phase = AirCut::Phase::kUnsteady;
@@ -364,7 +366,8 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .speed_rad_s = load.speed_rad_s,
                  .duration_s = h,
                  .valid = tick_.locked_s > kLock_s + kInertiaWait_s,
-                 .tared = idle,
+                 .idle = idle && air.idle_s > kAveragedTare_s,
+                 .in_cut = air.phase == AirCut::Phase::kCut,
                  .tare_nm = air.tare_nm});
 
   out.valid = true;

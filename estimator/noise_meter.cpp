@@ -164,6 +164,8 @@ void NoiseMeter::set_noise(float duration_s) noexcept {
     const float colour = beat < kSlowestBeat ? kWhiteBeat / kSlowestBeat
                                              : (beat < kWhiteBeat ? kWhiteBeat / beat : 1.0F);
     angle = colour * s.quantum_rad_s * s.quantum_rad_s * (1.0F / 12.0F);
+    // Counts differenced over a window that slides over the samples scatter by more than a quantum.
+    if (angle < most) angle = most;
     white = 0.0F;
   } else {
     const float known = white + 2.0F * angle;

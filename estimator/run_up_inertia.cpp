@@ -5,9 +5,10 @@
 namespace cutforce::estimator {
 namespace {
 
-constexpr float kTorqueError_ratio = 0.01F;          // of the run-up's torque: resistance, offsets
-constexpr float kTareError_ratio = 0.002F;           // of rated: friction differs while speeding up
-constexpr float kSmallestAcceleration_ratio = 0.1F;  // of rated, mean over the run-up
+constexpr float kTorqueError_ratio = 0.01F;  // of the run-up's torque: resistance, offsets
+constexpr float kTareError_ratio = 0.002F;   // of rated: friction differs while speeding up
+constexpr float kWorthwhile_ratio = 0.05F;   // of the given variance: an episode below counts
+constexpr float kLeastSigma_ratio = 0.005F;  // the torque's own errors repeat
 constexpr float kFarthest_sigmas = 2.0F;
 
 }  // namespace
@@ -22,20 +23,21 @@ auto RunUpInertia::make(const Config& config) noexcept -> std::expected<RunUpIne
   return RunUpInertia{config};
 }
 
+void RunUpInertia::forget_episode() noexcept {
+  state_.impulse_nm_s = state_.gained_rad_s = state_.time_s = 0.0F;
+}
+
 void RunUpInertia::step(const Input& in) noexcept {
   State& s = state_;
-  if (s.closed != 0) return;
-  if (!in.valid) {
+  if (!in.valid || in.in_cut) {
     s.seen = 0;
-    s.impulse_nm_s = s.gained_rad_s = s.time_s = 0.0F;
+    forget_episode();
     return;
   }
-  if (in.tared) {
+  if (in.idle) {
     close(in.tare_nm);
-    s.closed = 1;
-    return;
-  }
-  if (s.seen != 0) {
+    forget_episode();
+  } else if (s.seen != 0) {
     const float sign = in.speed_rad_s < 0.0F ? -1.0F : 1.0F;
     const float friction =
         config_.coulomb_torque_nm * sign + config_.viscous_nm_s_rad * in.speed_rad_s;
@@ -50,19 +52,23 @@ void RunUpInertia::step(const Input& in) noexcept {
 void RunUpInertia::close(float tare_nm) noexcept {
   State& s = state_;
   const float gained = s.gained_rad_s < 0.0F ? -s.gained_rad_s : s.gained_rad_s;
-  const float smallest =
-      kSmallestAcceleration_ratio * config_.rated_torque_nm * s.time_s / config_.inertia_kg_m2;
-  if (!(gained > smallest && gained > 0.0F && s.time_s > 0.0F)) return;
+  if (!(gained > 0.0F && s.time_s > 0.0F)) return;
   const float seen = (s.impulse_nm_s - tare_nm * s.time_s) / s.gained_rad_s;  // (E115)
   const float from_tare = kTareError_ratio * config_.rated_torque_nm * s.time_s / gained;
-  const float sigma =
-      std::sqrt(kTorqueError_ratio * seen * kTorqueError_ratio * seen + from_tare * from_tare);
-  const float prior = config_.inertia_sigma_ratio * config_.inertia_kg_m2;
-  const float off = seen - config_.inertia_kg_m2;
-  if (!(off < kFarthest_sigmas * prior && off > -kFarthest_sigmas * prior)) return;
-  const float gain = prior * prior / (prior * prior + sigma * sigma);
-  s.inertia_kg_m2 = config_.inertia_kg_m2 + gain * off;
-  s.sigma_ratio = std::sqrt(1.0F - gain) * config_.inertia_sigma_ratio;
+  const float from_torque = kTorqueError_ratio * seen;
+  const float given_sigma = config_.inertia_sigma_ratio * config_.inertia_kg_m2;
+  const float off_given = seen - config_.inertia_kg_m2;
+  const float farthest = kFarthest_sigmas * given_sigma;
+  if (!(off_given < farthest && off_given > -farthest)) return;
+  const float variance = from_torque * from_torque + from_tare * from_tare;
+  const float known = s.sigma_ratio * config_.inertia_kg_m2;
+  if (!(variance < known * known || variance < kWorthwhile_ratio * given_sigma * given_sigma))
+    return;
+  const float gain = known * known / (known * known + variance);
+  s.inertia_kg_m2 += gain * (seen - s.inertia_kg_m2);
+  s.sigma_ratio *= std::sqrt(1.0F - gain);
+  const float least = s.sigma_ratio < kLeastSigma_ratio ? kLeastSigma_ratio : s.sigma_ratio;
+  s.sigma_ratio = least < config_.inertia_sigma_ratio ? least : config_.inertia_sigma_ratio;
 }
 
 }  // namespace cutforce::estimator

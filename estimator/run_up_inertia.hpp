@@ -1,10 +1,11 @@
-// Inertia from the run-up before the first air cut.
+// Inertia from the run-up, and from every later change of speed between two air cuts.
 //
 //   J = integral(T - T_C - B w - b) dt / (w_end - w_start)                                  (E115)
-// over all accelerating time until the first tare b is known, then combined with the value given:
-// J' = J_0 + k (J - J_0), k = s_0^2 / (s_0^2 + s^2), s^2 = (error of T)^2 + (error of b t/dw)^2.
-// Only before the first cut, only over a change of speed worth measuring, and never further than
-// two of its own prior sigmas. Source: the integral of P3 (5); weights: EQUATIONS.md.
+// over the time between two idles, once the tare b is known, then combined with what was known:
+// J' = J + k (J_seen - J), k = s_J^2 / (s_J^2 + s^2), s^2 = (error of T)^2 + (error of b t/dw)^2.
+// A cut in between discards the episode. Only over a change of speed worth measuring, and never
+// further than two sigmas from the value given. Source: the integral of P3 (5); weights:
+// EQUATIONS.md.
 #pragma once
 
 #include <cstdint>
@@ -37,8 +38,9 @@ class RunUpInertia {
     float torque_nm;    // mean of the tick
     float speed_rad_s;  // end of the tick, filtered
     float duration_s;
-    bool valid;  // torque and speed can be told
-    bool tared;  // a tare is known: close
+    bool valid;   // torque and speed can be told
+    bool idle;    // in the air, with a tare that has been averaged: an episode ends here
+    bool in_cut;  // an episode that holds a cut is worth nothing
     float tare_nm;
   };
 
@@ -50,7 +52,6 @@ class RunUpInertia {
     float inertia_kg_m2 = 0.0F;
     float sigma_ratio = 0.0F;
     std::uint32_t seen = 0;
-    std::uint32_t closed = 0;
   };
 
   [[nodiscard]] static std::expected<RunUpInertia, ConfigError> make(const Config& config) noexcept;
@@ -64,6 +65,7 @@ class RunUpInertia {
  private:
   explicit RunUpInertia(const Config& config) noexcept;
   void close(float tare_nm) noexcept;
+  void forget_episode() noexcept;
 
   Config config_;
   State state_{};

@@ -121,7 +121,7 @@ estimator::FusedObserver::Config fused(const Machine& m, const Derived& d) noexc
           .filter = {.tick_s = tick_s,
                      .rated_torque_nm = m.rated_torque_nm,
                      // The flux angle's noise is larger and slower than a sensor's.
-                     .edge_slope_1_s = (sensorless ? 0.67F : 1.0F) * m.edge_slope_1_s,
+                     .edge_slope_1_s = (sensorless ? 0.75F : 1.0F) * m.edge_slope_1_s,
                      .drift_1_sqrt_s = m.drift_1_sqrt_s},
           .air = {.rated_torque_nm = m.rated_torque_nm,
                   .inertia_kg_m2 = m.inertia_kg_m2,

@@ -173,7 +173,9 @@ auto ControlLoop::step(const hal::Sample& sample) noexcept -> std::optional<Loop
   }
 
   own_.time_ns = sample.time_ns;
-  own_.elapsed_periods += gated.elapsed_periods;
+  // The very first sample ends no interval: the windows close at whole periods after it.
+  own_.elapsed_periods += own_.started != 0 ? gated.elapsed_periods : 0.0F;
+  own_.started = 1;
   if (own_.elapsed_periods < static_cast<float>(config_.samples_per_estimate) - 0.5F) {
     return std::nullopt;
   }

@@ -71,6 +71,7 @@ class ControlLoop {
   // What the loop itself keeps between samples.
   struct Own {
     std::int64_t time_ns = 0;
+    std::uint32_t started = 0;
     float elapsed_periods = 0.0F;  // in the estimate window so far
     std::uint32_t estimates = 0;   // in the control period so far
     float turning_s = 0.0F;        // with sound signals, saturating
