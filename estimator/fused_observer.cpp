@@ -11,7 +11,13 @@ constexpr float kTwoPi = 6.28318530718F;
 constexpr float kFrequencyTime_s = 0.015F;
 constexpr float kLowestFrequency_rad_s = kTwoPi * 3.0F;
 constexpr float kLock_s = 0.03F;
-constexpr float kInertiaWait_s = 0.1F;  // after the lock: the flux has settled
+constexpr float kInertiaWait_s = 0.1F;          // after the lock: the flux has settled
+constexpr float kRippleWait_s = 0.2F;           // until a transient has gone from the rest
+constexpr float kRippleSpeed_rad_s = 60.0F;     // slower, a turn is no quicker than a drift
+constexpr float kUsualResistance_ratio = 0.1F;  // what temperature does to copper, one sigma
+constexpr float kLate_ticks = 0.7F;
+constexpr float kFading_ratio = 0.8F;
+constexpr float kConsistencyShare = 0.02F;
 constexpr float kEvenTurns = 1.5F;
 constexpr float kUncalibrated_ratio = 0.03F;
 constexpr float kTareFollow_ratio = 0.02F;  // of what the tare belongs to, each tick
@@ -22,7 +28,8 @@ float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
 float rotated(SpaceVector now, SpaceVector before, float expected_rad) noexcept {
   const float angle = angle_of(dot(now, before), cross(now, before));
   const float turns = (expected_rad - angle) / kTwoPi;
-  return angle + kTwoPi * static_cast<float>(static_cast<int>(turns + (turns < 0.0F ? -0.5F : 0.5F)));
+  return angle +
+         kTwoPi * static_cast<float>(static_cast<int>(turns + (turns < 0.0F ? -0.5F : 0.5F)));
 }
 
 }  // namespace
@@ -126,7 +133,7 @@ auto FusedObserver::rotation(const FluxTorque::Window& window) noexcept -> Rotat
   const Rotation result{
       .flux_rad_s = rotated(rotor, tick_.rotor_flux_v_s, expected) / window.duration_s,
       .current_rad_s = rotated(i, tick_.current_a, expected) / window.duration_s,
-                        .flux_squared = dot(rotor, rotor)};  // (E100)
+      .flux_squared = dot(rotor, rotor)};  // (E100)
   tick_.rotor_flux_v_s = rotor;
   tick_.current_a = i;
   return result;
@@ -217,15 +224,24 @@ auto FusedObserver::unlocked(float speed_rad_s, AirCut::Feed feed, Output out) n
 }
 
 float FusedObserver::sigma_nm(const LoadTorqueFilter::Output& load, const AirCut::Output& air,
-                              float torque_nm, float copper, float change_nm) const noexcept {
+                              float torque_nm, float copper, float change_nm) noexcept {
   const float rated = config_.filter.rated_torque_nm;
   const float model = 5e-4F * rated;
   const float scale = 0.003F * air.net_torque_nm;
   const float inertia = inertia_.sigma_ratio() * (torque_nm - load.load_torque_nm);
-  const float resistance = resistance_.change_sigma_ohm() * (copper - tick_.idle_copper);
-  const float moved = 0.7F * change_nm;
-  const float noise =
-      load.variance_nm2 > air.idle_variance_nm2 ? load.variance_nm2 : air.idle_variance_nm2;
+  const float found_ohm = resistance_.change_sigma_ohm();
+  const float usual_ohm = kUsualResistance_ratio * config_.flux.stator_resistance_ohm;
+  const float resistance =
+      (found_ohm < usual_ohm ? found_ohm : usual_ohm) * (copper - tick_.idle_copper);
+  const float fading = kFading_ratio * tick_.moved_nm;
+  tick_.moved_nm = magnitude(change_nm) > fading ? magnitude(change_nm) : fading;
+  const float moved = kLate_ticks * tick_.moved_nm;
+  // Innovations larger than expected: the load moves in a way that neither model knows.
+  tick_.consistency_ratio += kConsistencyShare * (load.consistency_ratio - tick_.consistency_ratio);
+  const float excess = tick_.consistency_ratio > 1.0F ? tick_.consistency_ratio : 1.0F;
+  const float noise = excess * load.variance_nm2 > air.idle_variance_nm2
+                          ? excess * load.variance_nm2
+                          : air.idle_variance_nm2;
   return std::sqrt(noise + model * model + scale * scale + inertia * inertia +
                    resistance * resistance + moved * moved +
                    air.tare_sigma_nm * air.tare_sigma_nm);  // (E104)
@@ -252,6 +268,7 @@ void FusedObserver::learn(const FluxTorque::Window& window, const Rotation& r, c
                     .frequency_rad_s = tick_.frequency_rad_s,
                     .torque_nm = window.torque_nm,
                     .current_squared_a2 = window.current_squared_a2,
+                    .idle_copper_nm_ohm = tick_.idle_copper,
                     .duration_s = out.duration_s,
                     .steady = tick_.even_s > 0.0F && tick_.calibrated != 0});
 }
@@ -321,7 +338,7 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .airgap_torque_nm = torque,
                  // The field's own speed is calmer than what the flux says of the shaft's.
                  .speed_rad_s = config_.sensorless ? (tick_.frequency_rad_s - speed.slip_rad_s) / p
-                                                    : load.speed_rad_s,
+                                                   : load.speed_rad_s,
                  .speed_sigma_rad_s = std::sqrt(noise.speed_variance + 2.0F * noise.angle_variance),
                  .duration_s = h,
                  .feed = feed,
@@ -339,7 +356,8 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
   }
   // Before the first tare a ripple may be what keeps the torque from being known well enough.
   const bool even = air.steady && tick_.calibrated != 0 && !air.has_tare;
-  if ((idle || even) && speed.valid && !config_.sensorless) {
+  if ((idle || even) && tick_.even_s > kRippleWait_s && speed.valid &&
+      magnitude(speed.mean_rad_s) > kRippleSpeed_rad_s && !config_.sensorless) {
     ripple_.learn(noise_.rest_rad_s() + tick_.ripple_rad_s, h);
   }
   inertia_.step({.torque_nm = window.torque_nm,

@@ -116,8 +116,10 @@ class FusedObserver {
     std::uint32_t speed_count = 0;
     float meter_w = 0.0F;
     std::uint32_t meter_count = 0;
-    float ripple_rad_s = 0.0F;       // taken off the speed of this tick
+    float ripple_rad_s = 0.0F;  // taken off the speed of this tick
     float load_torque_nm = 0.0F;
+    float moved_nm = 0.0F;              // largest recent change of a tick, fading
+    float consistency_ratio = 1.0F;     // of the innovations, averaged
     float idle_copper = 0.0F;           // x of (E110) when the tare was taken
     float idle_power_torque_nm = 0.0F;  // P_i p / w_e likewise
     std::uint32_t ticks = 0;            // since the estimate became valid
@@ -175,7 +177,7 @@ class FusedObserver {
   void learn(const FluxTorque::Window& window, const Rotation& rotation, const Output& out,
              float copper, float speed_rad_s) noexcept;
   [[nodiscard]] float sigma_nm(const LoadTorqueFilter::Output& load, const AirCut::Output& air,
-                               float torque_nm, float copper, float change_nm) const noexcept;
+                               float torque_nm, float copper, float change_nm) noexcept;
   [[nodiscard]] Output unlocked(float speed_rad_s, AirCut::Feed feed, Output out) noexcept;
 
   Config config_;

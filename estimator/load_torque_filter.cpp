@@ -123,6 +123,7 @@ auto LoadTorqueFilter::step(const Input& input, const Noise& noise) noexcept -> 
   }
 
   Innovation of_quiet{};
+  float consistency = 1.0F;
   if (input.speed_valid) {
     of_quiet = correct(quiet, noise.angle_variance);
     const Innovation of_edge = correct(edge, noise.angle_variance);
@@ -137,6 +138,8 @@ auto LoadTorqueFilter::step(const Input& input, const Noise& noise) noexcept -> 
       if (p > 1.0F - kSmallestProbability) p = 1.0F - kSmallestProbability;
       if (!(p > kSmallestProbability)) p = kSmallestProbability;
       state_.edge_probability = p;
+      consistency = (1.0F - p) * of_quiet.value * of_quiet.value / of_quiet.variance +
+                    p * of_edge.value * of_edge.value / of_edge.variance;
     }
   } else {
     state_.edge_probability = edge_prior;
@@ -149,6 +152,7 @@ auto LoadTorqueFilter::step(const Input& input, const Noise& noise) noexcept -> 
                           p * (1.0F - p) * spread * spread,
           .speed_rad_s = quiet.mean[1] + p * (edge.mean[1] - quiet.mean[1]),
           .edge_probability = p,
+          .consistency_ratio = consistency,
           .innovation_rad_s = of_quiet.value};
 }
 

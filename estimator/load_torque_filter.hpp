@@ -65,7 +65,8 @@ class LoadTorqueFilter {
     float variance_nm2;  // of the mixture
     float speed_rad_s;   // filtered, end of the tick
     float edge_probability;
-    float innovation_rad_s;  // of the quiet model
+    float consistency_ratio;  // squared innovation over its expected variance, mixed
+    float innovation_rad_s;   // of the quiet model
   };
 
   struct Model {

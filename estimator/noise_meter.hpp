@@ -7,13 +7,12 @@
 // and for the torque, whichever is less of
 //   E[(third difference of T)^2] / 20   and   E[(second difference of T - J dw/h)^2] / 6,
 // divided by what the trapezoid over n samples leaves of white noise in these differences,
-// (n - 7/8)/n and (8 n^2 - 5)/(18 n^2): in the second T stands as T - M + M_prev, for dw is of means.
-// A speed that only comes in multiples of one quantum q is made of encoder counts: A = c q^2/12, c
-// from the beat of counts and ticks.
-// Averages are of blocks of 50 ticks; a block much quieter than the mean replaces it (the mean
-// held a transient), a much louder one counts as a little louder only, unless it goes on.
-// Source: ESTIMATOR prototype 1.3, tuning; the split of white, bounded and slow noise:
-// EQUATIONS.md.
+// (n - 7/8)/n and (8 n^2 - 5)/(18 n^2): in the second T stands as T - M + M_prev, for dw is of
+// means. A speed that only comes in multiples of one quantum q is made of encoder counts: A = c
+// q^2/12, c from the beat of counts and ticks. Averages are of blocks of 50 ticks; a block much
+// quieter than the mean replaces it (the mean held a transient), a much louder one counts as a
+// little louder only, unless it goes on. Source: ESTIMATOR prototype 1.3, tuning; the split of
+// white, bounded and slow noise: EQUATIONS.md.
 #pragma once
 
 #include <array>

@@ -2,8 +2,8 @@
 //
 //   theta += w_m h;   e = a_1 cos theta + b_1 sin theta + a_2 cos 2 theta + b_2 sin 2 theta (E105)
 // Learned from the unexplained rest of the speed while idle (stochastic gradient, 0.5 s), taken off
-// the measured speed always. Applied only once it stands out of what noise alone would teach.
-// Source: ESTIMATOR prototype 1.3, "once-per-revolution speed error".
+// the measured speed always. Applied only where it explains a good part of the rest: a transient or
+// noise does not. Source: ESTIMATOR prototype 1.3, "once-per-revolution speed error".
 #pragma once
 
 #include <array>
@@ -22,7 +22,6 @@ class SpeedRipple {
     float sine = 0.0F;
     float rest_variance = 0.0F;  // of what was learned from
     float learned_s = 0.0F;
-    float last_gain = 1.0F;
   };
 
   // Error of the speed measured over the tick that turns the shaft by speed_rad_s * duration_s.
@@ -53,7 +52,6 @@ class SpeedRipple {
     state_.rest_variance += 0.5F * gain * (error * error - state_.rest_variance);
     state_.learned_s += duration_s;
     if (state_.learned_s > kLongest_s) state_.learned_s = kLongest_s;
-    state_.last_gain = gain;
   }
 
   // The shaft was lost (a gap, standstill): the phase is unknown.
@@ -62,8 +60,7 @@ class SpeedRipple {
   [[nodiscard]] constexpr bool applies() const noexcept {
     float power = 0.0F;
     for (const float a : state_.amplitude_rad_s) power += a * a;
-    return state_.learned_s > kTime_s &&
-           power > kStandsOut_ratio * state_.last_gain * state_.rest_variance;
+    return state_.learned_s > kTime_s && power > kStandsOut_ratio * state_.rest_variance;
   }
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
@@ -73,7 +70,7 @@ class SpeedRipple {
   static constexpr float kTime_s = 0.5F;
   static constexpr float kLongest_s = 100.0F;
   static constexpr float kLargestAngle_rad = 0.8F;
-  static constexpr float kStandsOut_ratio = 20.0F;
+  static constexpr float kStandsOut_ratio = 0.5F;
 
   [[nodiscard]] constexpr float value() const noexcept {
     const auto& a = state_.amplitude_rad_s;

@@ -6,14 +6,13 @@ namespace cutforce::estimator {
 namespace {
 
 constexpr float kBlock_s = 0.05F;
-constexpr float kModelError_ratio =
-    0.006F;                           // of flux, slip and torque together; does not average out
-constexpr float kModelCount = 20.0F;  // blocks that share that error
-constexpr float kSlipNoise_rad_s = 0.02F;  // of a block's mean
-constexpr float kSteady_ratio = 0.02F;     // torque may move by this much of rated within a block
+constexpr float kModelError_ratio = 0.02F;  // flux, slip, torque: saturation moves R_R
+constexpr float kModelCount = 20.0F;        // blocks that share that error
+constexpr float kSlipNoise_rad_s = 0.02F;   // of a block's mean
+constexpr float kSteady_ratio = 0.02F;      // torque may move by this much of rated within a block
 constexpr float kScatterShare = 0.2F;
 constexpr float kScatterCount = 4.0F;  // slow noise: blocks are not independent
-constexpr float kStandsOut_sigmas = 3.0F;
+constexpr float kStandsOut_sigmas = 1.6F;
 constexpr float kLargestRise_ratio = 1.0F;  // of the resistance in use
 constexpr float kLargestFall_ratio = 0.5F;
 
@@ -36,6 +35,17 @@ auto StatorResistance::make(const Config& config) noexcept
 
 void StatorResistance::step(const Input& in) noexcept {
   auto& s = state_.sums;
+  // The copper term of the idle must stand out of what the iron loss may be.
+  const float speed_ratio = (in.frequency_rad_s < 0.0F ? -in.frequency_rad_s : in.frequency_rad_s) /
+                            config_.rated_frequency_rad_s;
+  const float copper =
+      config_.resistance_sigma_ratio * config_.stator_resistance_ohm *
+      (in.idle_copper_nm_ohm < 0.0F ? -in.idle_copper_nm_ohm : in.idle_copper_nm_ohm);
+  if (!(copper > kStandsOut_sigmas * config_.iron_torque_sigma_nm * speed_ratio)) {
+    s.fill(0.0F);
+    state_.blocks = 0;
+    return;
+  }
   const float moved = in.torque_nm - state_.first_torque_nm;
   const float limit = kSteady_ratio * config_.rated_torque_nm;
   if (!in.steady || moved > limit || moved < -limit) {
@@ -65,10 +75,6 @@ void StatorResistance::learn() noexcept {
   const float torque = s[2] / s[5];
   const float x = s[3] / s[5];
   const float speed_ratio = s[4] / s[5] / config_.rated_frequency_rad_s;
-  // The copper term must stand out of what the iron loss may be.
-  const float copper = config_.resistance_sigma_ratio * config_.stator_resistance_ohm * x;
-  const float magnitude = copper < 0.0F ? -copper : copper;
-  if (!(magnitude > kStandsOut_sigmas * config_.iron_torque_sigma_nm * speed_ratio)) return;
 
   const float flux2 = s[0] / s[5];
   const float y = flux2 * s[1] / s[5];

@@ -53,6 +53,7 @@ class StatorResistance {
     float frequency_rad_s;       // smoothed w_e
     float torque_nm;
     float current_squared_a2;
+    float idle_copper_nm_ohm;  // x of the idle: without it in view A and dR cannot be told apart
     float duration_s;
     bool steady;
   };
