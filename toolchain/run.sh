@@ -15,10 +15,9 @@ step "set up" toolchain/setup.sh build
 step "configure" cmake --preset host-release
 step "build" cmake --build --preset host-release --target cutforce
 
-mkdir -p out/demo out/replay
 shown_step "demo: a simulated lathe in closed loop" "$program" demo --out out/demo
-shown_step "replay: force from a recording" "$program" replay "$recording" --out out/replay/trace.csv
-step "report on the replay" "$program" report out/replay
+shown_step "replay: force from a recording" "$program" replay "$recording" \
+  --out out/replay/trace.csv --report
 
 reports=()
 for report in out/demo/report.html out/replay/report.html; do

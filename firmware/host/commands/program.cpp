@@ -1,14 +1,21 @@
+#include <algorithm>
 #include <csignal>
 #include <exception>
 #include <iostream>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "firmware/host/commands/command.hpp"
 #include "firmware/host/commands/progress.hpp"
+#include "firmware/host/unit_hint.hpp"
 
 namespace cutforce::firmware::host {
 namespace {
+
+using hal::host::InputError;
 
 constexpr const char* kFooter =
     R"(Examples:
@@ -20,9 +27,27 @@ constexpr const char* kFooter =
 Exit status: 0 done; 1 the work failed or a check did not hold; 2 the input or the command line is
 wrong.)";
 
+// A first word that is no command, and the command that was probably meant.
+std::optional<InputError> unknown_command(const CLI::App& program, const std::string& word) {
+  std::vector<std::string_view> names;
+  std::vector<std::string> kept;
+  for (const auto* command : program.get_subcommands({})) kept.push_back(command->get_name());
+  for (const auto& name : kept) names.push_back(name);
+  if (word.starts_with('-') || std::ranges::find(names, word) != names.end()) return {};
+  const auto meant = nearest(word, names);
+  return InputError{"cutforce", "there is no command " + word,
+                    meant ? "perhaps " + std::string(*meant) + " is meant; see cutforce --help"
+                          : "see cutforce --help"};
+}
+
 // CLI11 has an exit status for each mistake; a person has one.
-int understand(const CLI::App& program, const CLI::ParseError& error) {
+int understand(const CLI::App& program, const CLI::ParseError& error, const char* first) {
   if (error.get_exit_code() == 0) return program.exit(error);
+  if (first != nullptr) {
+    if (const auto unknown = unknown_command(program, first)) {
+      return static_cast<int>(refuse(*unknown));
+    }
+  }
   std::cerr << "cutforce: " << error.what() << "\n";
   const auto chosen = program.get_subcommands();
   std::cerr << "  remedy: see cutforce " << (chosen.empty() ? "" : chosen[0]->get_name() + " ")
@@ -77,7 +102,7 @@ int run_program(int argc, const char* const* argv) {
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return understand(program, error);
+    return understand(program, error, argc > 1 ? argv[1] : nullptr);
   }
   std::signal(SIGPIPE, SIG_IGN);  // a reader that went away is a failed write, not the end
   try {

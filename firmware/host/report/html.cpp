@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 namespace cutforce::firmware::host {
@@ -14,8 +15,10 @@ std::string shown(const Json& value) {
   if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
   if (value.is_null()) return "none";
   if (value.is_number_float()) {
+    const double number = value.get<double>();
+    const bool whole = number == std::round(number) && std::abs(number) < 1e9;
     std::array<char, 48> text{};
-    std::snprintf(text.data(), text.size(), "%.6g", value.get<double>());
+    std::snprintf(text.data(), text.size(), whole ? "%.0f" : "%.4g", number);
     return text.data();
   }
   if (value.is_array()) {

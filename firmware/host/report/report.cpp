@@ -77,7 +77,26 @@ Json embedded(const Run& run, const Json& summary, const std::vector<TraceFile>&
   return data;
 }
 
+// A trace alone, as `cutforce replay` leaves it, is a run too.
+Json summary_of_files(const std::filesystem::path& dir) {
+  Json summary;
+  for (const auto* trace : {"trace.csv", "trace.csv.gz"}) {
+    if (summary.is_null() && std::filesystem::exists(dir / trace))
+      summary = {{"title", "Trace " + (dir / trace).lexically_normal().string()},
+                 {"traces", {{{"name", "estimate"}, {"path", trace}}}}};
+  }
+  for (const auto* recording : {"recording.csv", "recording.csv.gz"}) {
+    if (summary.is_object() && std::filesystem::exists(dir / recording))
+      summary["recording"] = recording;
+  }
+  return summary;
+}
+
 std::expected<Json, InputError> read_summary(const std::filesystem::path& path) {
+  if (!std::filesystem::exists(path)) {
+    Json made = summary_of_files(path.parent_path());
+    if (made.is_object()) return made;
+  }
   std::ifstream file(path, std::ios::binary);
   if (!file)
     return std::unexpected(InputError{path.string(), "the file cannot be opened",

@@ -19,6 +19,7 @@
 //     "events":    [{"t_s": 2.0, "text": "tool enters"}, ...]
 //     "machine":   {"motor": {"pole_pairs": 2, ...}, ...}          any nesting
 //   }
+// Where summary.json is missing, trace.csv[.gz] and recording.csv[.gz] are the run.
 // All but title and traces may be left out, and keys that are not named here are ignored. Paths are
 // relative to the directory. Texts are shown as they are: no markup in them is obeyed.
 //

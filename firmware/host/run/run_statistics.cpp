@@ -129,21 +129,22 @@ std::vector<Figure> RunStatistics::figures(const Machine& machine) const {
   };
   const auto add = [&figures](Figure figure) { figures.push_back(std::move(figure)); };
   if (air_torque_.count > 0) {
-    add({"air_torque_nm", "Cutting torque in air, mean", air_torque_.mean(), "N m", "0 is right"});
+    add({"air_torque_nm", "Cutting torque, mean in air", air_torque_.mean(), "N m", "0 is right"});
   }
   if (torque_.count > 0) {
     add({"torque_most_nm", "Cutting torque, highest", torque_.most, "N m"});
   }
   if (torque_sigma_.count > 0) {
-    add({"torque_sigma_nm", "Its standard deviation, mean", torque_sigma_.mean(), "N m"});
-    add({"torque_sigma_pct", "  of rated torque", 100.0 * torque_sigma_.mean() / rated_nm, "%"});
+    add({"torque_sigma_nm", "Cutting torque, sigma, mean", torque_sigma_.mean(), "N m"});
+    add({"torque_sigma_pct", "Cutting torque, sigma, mean", 100.0 * torque_sigma_.mean() / rated_nm,
+         "% of rated"});
   }
   if (cut_force_.count > 0) {
-    add({"cut_force_n", "Cutting force in the cut, mean", cut_force_.mean(), "N"});
-    add({"cut_force_most_n", "  highest", cut_force_.most, "N"});
+    add({"cut_force_n", "Cutting force, mean in the cut", cut_force_.mean(), "N"});
+    add({"cut_force_most_n", "Cutting force, highest", cut_force_.most, "N"});
   }
   if (force_sigma_.count > 0) {
-    add({"force_sigma_n", "Its standard deviation, mean", force_sigma_.mean(), "N"});
+    add({"force_sigma_n", "Cutting force, sigma, mean", force_sigma_.mean(), "N"});
   }
   if (override_.count > 0) {
     add({"override_least_pct", "Override, lowest", override_.least, "%"});

@@ -99,14 +99,14 @@ std::vector<Figure> TruthScore::estimate_figures(const Machine& machine) const {
   const auto count = static_cast<double>(known);
   std::vector<Figure> figures{
       {"error_mean_pct", "Torque error, mean", 100.0 * sum / count / rated_nm, "% of rated"},
-      {"error_rms_pct", "  root mean square", 100.0 * std::sqrt(square / count) / rated_nm,
+      {"error_rms_pct", "Torque error, rms", 100.0 * std::sqrt(square / count) / rated_nm,
        "% of rated"},
-      {"error_worst_pct", "  worst", 100.0 * worst / rated_nm, "% of rated"},
-      {"coverage_pct", "Within 2 sigma", 100.0 * static_cast<double>(covered) / count, "%",
-       "95 is right"}};
+      {"error_worst_pct", "Torque error, worst", 100.0 * worst / rated_nm, "% of rated"},
+      {"coverage_pct", "Torque error within 2 sigma", 100.0 * static_cast<double>(covered) / count, "%",
+       "of the time; 95 or more is right"}};
   const double lag = lag_s();
   if (std::isfinite(lag)) {
-    figures.push_back({"estimate_lag_ms", "Lag of the estimate", 1e3 * lag, "ms"});
+    figures.push_back({"estimate_lag_ms", "Torque estimate's lag", 1e3 * lag, "ms"});
   }
   return figures;
 }
@@ -133,17 +133,18 @@ void TruthScore::add_stretch(const Stretch& stretch, double reference_n,
   }
   const double mean_n = sum / count;
   const std::string depth = millimetres(stretch.depth_m);
+  const std::string held = "Force at " + depth;
   const std::string key = "depth_" + depth.substr(0, depth.find(' ')) + "_mm_";
-  out.push_back({key + "force_n", "Force held at " + depth, mean_n, "N", "second half"});
-  out.push_back({key + "steady_error_pct", "  steady error",
+  out.push_back({key + "force_n", held, mean_n, "N", "true force, second half of the stretch"});
+  out.push_back({key + "steady_error_pct", held + ", steady error",
                  100.0 * (mean_n - reference_n) / reference_n, "% of reference"});
-  out.push_back({key + "force_sd_n", "  standard deviation",
+  out.push_back({key + "force_sd_n", held + ", standard deviation",
                  std::sqrt(std::max(square / count - mean_n * mean_n, 0.0)), "N"});
-  out.push_back({key + "peak_n", "  peak", peak_n, "N"});
+  out.push_back({key + "peak_n", held + ", peak", peak_n, "N"});
   if (settled_s < 0.95 * length_s) {
-    out.push_back({key + "settling_s", "  settled to 5 % after", settled_s, "s"});
+    out.push_back({key + "settling_s", held + ", within 5 % after", settled_s, "s"});
   } else {
-    out.push_back({key + "settling_s", "  settled to 5 % after", std::string("never"), ""});
+    out.push_back({key + "settling_s", held + ", within 5 % after", std::string("never"), ""});
   }
 }
 
