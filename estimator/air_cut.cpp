@@ -92,6 +92,7 @@ auto AirCut::decide(const Input& input, float y_nm, float slope_nm, float sign) 
       return net > 0.0F && !speeding_up && !braking ? Phase::kCut : Phase::kUnsteady;
     }
     case Phase::kCut: {
+      if (state_.has_tare == 0 && waited) break;  // as at the start: nothing to compare with
       if (!waited || !(magnitude(state_.slow_net_nm) <= threshold)) return Phase::kCut;
       return magnitude(net) <= threshold ? Phase::kIdle : Phase::kCut;
     }
@@ -149,7 +150,8 @@ auto AirCut::step(const Input& input) noexcept -> Output {
       state_.idle_s = 0.0F;
     }
     if (now == Phase::kCut) state_.was_cut = 1;
-    if (now == Phase::kCut && before != Phase::kCut) state_.steady_s = 0.0F;
+    // What has just changed has not been steady: its slope shows only some ticks later.
+    if (now != before && now != Phase::kIdle) state_.steady_s = 0.0F;
     if (now == Phase::kIdle) {
       state_.was_cut = 0;
       if (before != Phase::kIdle && state_.has_tare != 0 && input.feed == Feed::kUnknown) {
