@@ -91,7 +91,7 @@ TEST(BadRecording, LeavesAnEarlierTraceAsItWas) {
   const ScratchFolder folder;
   const auto file = folder.write("bad.csv", recording(kNames, good_rows(2000) + "2,1,2,x,4,5,6\n"));
   const auto trace = folder.write("x.csv", "precious");
-  expect_refused(folder, "replay " + q(file) + " --out " + q(trace), ":2006:");
+  expect_refused(folder, "replay " + q(file) + " --out " + q(trace), ":2007:");
   EXPECT_EQ(bytes_of(trace), "precious");
 }
 
