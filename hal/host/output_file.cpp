@@ -34,7 +34,7 @@ std::filesystem::path temporary_for(const std::filesystem::path& path) {
 struct OutputFile::Impl {
   std::string name;
   std::filesystem::path target;
-  std::filesystem::path temporary;  // empty: written directly
+  std::filesystem::path temporary;                                       // empty: written directly
   std::filesystem::perms permissions = std::filesystem::perms::unknown;  // of what it replaces
   std::FILE* file = nullptr;
   bool gzip = false;
