@@ -147,7 +147,7 @@ TEST(Replay, NamesTheFaultsOfASoundButBadRecording) {
   const std::string head = bytes_of(in_tests("scenarios/vhz.toml"));
   const std::vector<std::pair<std::string, std::string>> table{
       {"kind = \"gap\"\nbegin_s = 1.8\nend_s = 2\n", "fault_gap"},
-      {"kind = \"stuck\"\nchannel = \"current_u\"\nbegin_s = 1.8\n", "fault_stuck_channel"},
+      {"kind = \"stuck\"\nchannel = \"voltage_v\"\nbegin_s = 1.8\n", "fault_stuck_channel"},
       {"kind = \"lost\"\nchannel = \"current_v\"\nbegin_s = 1.8\n", "fault_lost_phase"},
       {"kind = \"swapped\"\nchannel = \"voltage_u\"\nother = \"voltage_v\"\n", "fault_phase_order"},
   };

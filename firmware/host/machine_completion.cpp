@@ -109,8 +109,8 @@ void derive(MachineFile& file, std::vector<std::string>& warnings) {
   if (const auto warning = poles_warning(file, file.machine)) warnings.push_back(*warning);
 }
 
-// The shortest estimate period from the usual one on that is whole samples long and fits the control
-// period; none within it.
+// The shortest estimate period from the usual one on that is whole samples long and fits the
+// control period; none within it.
 std::optional<float> fitting_estimate_period_s(const Machine& machine) {
   for (int samples = 1; samples <= 1000; ++samples) {
     const float period_s = static_cast<float>(samples) / machine.sample_rate_hz;
@@ -150,8 +150,7 @@ void fit_periods(MachineFile& file, std::vector<std::string>& warnings) {
     }
   }
   if (control_demanded || detail::is_multiple(usual_control_s, machine.estimate_period_s)) return;
-  const float estimates =
-      std::max(std::round(usual_control_s / machine.estimate_period_s), 1.0F);
+  const float estimates = std::max(std::round(usual_control_s / machine.estimate_period_s), 1.0F);
   machine.control_period_s = estimates * machine.estimate_period_s;
   warnings.push_back(period_warning("control_period_s", machine.control_period_s));
 }

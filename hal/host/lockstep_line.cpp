@@ -7,6 +7,9 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
+
+#include "hal/host/recording_columns.hpp"
 
 namespace cutforce::hal::host {
 namespace {
@@ -14,52 +17,43 @@ namespace {
 constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();  // JSON has no NaN of its own
 constexpr double kLongestTimeS = 9e9;                                 // int64 nanoseconds: 9.22e9 s
 
-struct Column {
+constexpr std::size_t kMostKeys = 32;
+
+// A key of a line: a recording's column.
+struct Key {
   std::string_view name;
   Signal signal;
-  float Sample::*value;  // nullptr: the element `phase` of a voltage or current
-  std::size_t phase;
+  std::uint16_t offset;  // of the float in Sample
   double units_per_si;
   LockstepVoltages voltages;
 };
 
-constexpr Column scalar(std::string_view name, Signal signal, float Sample::*value,
-                        double units_per_si = 1.0) {
-  return {name, signal, value, 0, units_per_si, LockstepVoltages::kNone};
-}
-constexpr Column phase(std::string_view name, Signal signal, std::size_t index,
-                       LockstepVoltages voltages) {
-  return {name, signal, nullptr, index, 1.0, voltages};
+LockstepVoltages voltages_of(const Column& column) {
+  const auto kind = voltage_kind_of(column);
+  if (!kind) return LockstepVoltages::kNone;
+  return *kind == VoltageKind::kLineToLine ? LockstepVoltages::kLineToLine
+                                           : LockstepVoltages::kLineToNeutral;
 }
 
-// Index 0 is the time, which is no Signal.
-constexpr std::array kColumns{
-    Column{"t_s", Signal::kVoltageU, nullptr, 0, 1.0, LockstepVoltages::kNone},
-    phase("v_un_v", Signal::kVoltageU, 0, LockstepVoltages::kLineToNeutral),
-    phase("v_vn_v", Signal::kVoltageV, 1, LockstepVoltages::kLineToNeutral),
-    phase("v_wn_v", Signal::kVoltageW, 2, LockstepVoltages::kLineToNeutral),
-    phase("v_uv_v", Signal::kVoltageU, 0, LockstepVoltages::kLineToLine),
-    phase("v_vw_v", Signal::kVoltageV, 1, LockstepVoltages::kLineToLine),
-    phase("v_wu_v", Signal::kVoltageW, 2, LockstepVoltages::kLineToLine),
-    phase("i_u_a", Signal::kCurrentU, 0, LockstepVoltages::kNone),
-    phase("i_v_a", Signal::kCurrentV, 1, LockstepVoltages::kNone),
-    phase("i_w_a", Signal::kCurrentW, 2, LockstepVoltages::kNone),
-    scalar("speed_rad_s", Signal::kSpeed, &Sample::speed_rad_s),
-    scalar("power_meter_w", Signal::kPowerMeter, &Sample::power_meter_w),
-    scalar("measured_force_n", Signal::kMeasuredForce, &Sample::measured_force_n),
-    scalar("feed_active", Signal::kFeedActive, &Sample::feed_active),
-    scalar("override_pct", Signal::kOverrideApplied, &Sample::override_applied_pct),
-    scalar("workpiece_diameter_m", Signal::kWorkpieceDiameter, &Sample::workpiece_diameter_m),
-    scalar("workpiece_diameter_mm", Signal::kWorkpieceDiameter, &Sample::workpiece_diameter_m, 1e3),
-    scalar("feed_mm_min", Signal::kFeedRate, &Sample::feed_m_s, 6e4),
-    scalar("enable", Signal::kEnable, &Sample::enable),
-};
-constexpr std::size_t kUnknown = kColumns.size();
+// The recording's own columns but truth; index 0 is the time, which is no Signal.
+std::vector<Key> sample_columns() {
+  std::vector<Key> columns;
+  columns.reserve(kMostKeys);
+  for (const Column& column : known_columns()) {
+    if (column.role != ColumnRole::kTime && column.role != ColumnRole::kSample) continue;
+    columns.push_back({column.name, static_cast<Signal>(column.signal), column.offset,
+                       column.units_per_si, voltages_of(column)});
+  }
+  return columns;
+}
+
+const std::vector<Key> kColumns = sample_columns();
+constexpr std::size_t kUnknown = kMostKeys;
 
 std::size_t column_of(std::string_view key) {
   std::size_t i = 0;
   while (i < kColumns.size() && kColumns[i].name != key) ++i;
-  return i;
+  return i < kColumns.size() ? i : kUnknown;
 }
 
 struct Values {
@@ -76,7 +70,7 @@ class Tokens final : public nlohmann::json_sax<nlohmann::json> {
  public:
   explicit Tokens(std::size_t line) : where_("line " + std::to_string(line)) {}
 
-  std::array<Values, kColumns.size()> columns;
+  std::array<Values, kMostKeys> columns;  // beside kColumns
 
   [[nodiscard]] std::optional<InputError>& error() { return error_; }
   [[nodiscard]] InputError error_at_key(std::size_t column, std::string what,
@@ -254,10 +248,8 @@ float to_float(double value) {
   return static_cast<float>(value);
 }
 
-float& field(Sample& sample, const Column& column) {
-  if (column.value != nullptr) return sample.*column.value;
-  return column.signal <= Signal::kVoltageW ? sample.voltage_v[column.phase]
-                                            : sample.current_a[column.phase];
+float& field(Sample& sample, const Key& key) {
+  return *reinterpret_cast<float*>(reinterpret_cast<std::byte*>(&sample) + key.offset);
 }
 
 std::vector<Sample> samples_of(const Tokens& tokens) {

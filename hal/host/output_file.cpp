@@ -34,7 +34,8 @@ std::filesystem::path temporary_for(const std::filesystem::path& path) {
 struct OutputFile::Impl {
   std::string name;
   std::filesystem::path target;
-  std::filesystem::path temporary;  // empty: written directly
+  std::filesystem::path temporary;                                       // empty: written directly
+  std::filesystem::perms permissions = std::filesystem::perms::unknown;  // of what it replaces
   std::FILE* file = nullptr;
   bool gzip = false;
   z_stream stream{};
@@ -107,6 +108,8 @@ auto OutputFile::create(const std::filesystem::path& path)
     const auto resolved = std::filesystem::weakly_canonical(path, error);  // keep a link a link
     if (!error) impl->target = resolved;
     impl->temporary = temporary_for(impl->target);
+    const auto before = std::filesystem::status(impl->target, error);
+    if (std::filesystem::exists(before)) impl->permissions = before.permissions();
     mode = "wbx";
   }
   errno = 0;
@@ -151,6 +154,9 @@ auto OutputFile::finish() -> std::expected<void, InputError> {
   }
   if (impl_->temporary.empty()) return {};
   std::error_code error;
+  if (impl_->permissions != std::filesystem::perms::unknown) {
+    std::filesystem::permissions(impl_->temporary, impl_->permissions, error);
+  }
   std::filesystem::rename(impl_->temporary, impl_->target, error);
   if (error) return impl_->fail(error.message());
   impl_->temporary.clear();

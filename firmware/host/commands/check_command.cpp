@@ -58,8 +58,10 @@ Exit perform(const Options& options) {
       is_scenario(options.file) ? check_scenario(options.file) : check_machine(options.file);
   const bool sound = checked.errors.empty();
   if (options.json) {
-    nlohmann::ordered_json json{
-        {"file", options.file}, {"kind", checked.kind}, {"ok", sound}, {"derived", checked.warnings}};
+    nlohmann::ordered_json json{{"file", options.file},
+                                {"kind", checked.kind},
+                                {"ok", sound},
+                                {"derived", checked.warnings}};
     json["errors"] = nlohmann::ordered_json::array();
     for (const auto& error : checked.errors) {
       json["errors"].push_back(

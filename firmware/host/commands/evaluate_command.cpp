@@ -104,8 +104,7 @@ std::expected<EvaluationOptions, InputError> choose(const Options& options) {
       return std::unexpected{InputError{"--estimator", "there is none named " + name,
                                         "give one of " + names_text<EstimatorName>()}};
     }
-    chosen.estimators.push_back(
-        static_cast<EstimatorName>(found - kNames<EstimatorName>.begin()));
+    chosen.estimators.push_back(static_cast<EstimatorName>(found - kNames<EstimatorName>.begin()));
   }
   for (const auto& name : options.conditions) {
     if (const Condition* condition = find_condition(name)) {
@@ -164,8 +163,8 @@ void add_evaluate(CLI::App& program, Action& action) {
       "evaluate", "Every estimator on every recording with truth, under every condition");
   auto options = std::make_shared<Options>();
   command->add_option("DIR", options->folder, "Folder with recordings")->capture_default_str();
-  command->add_option("--estimator", options->estimators,
-                      "Only these: " + names_text<EstimatorName>())
+  command
+      ->add_option("--estimator", options->estimators, "Only these: " + names_text<EstimatorName>())
       ->type_name("NAME");
   command->add_option("--condition", options->conditions, "Only these; see the table's legend")
       ->type_name("NAME");

@@ -136,7 +136,8 @@ void add_lockstep(CLI::App& program, Action& action) {
       ->add_option("--voltages", options->voltages,
                    names_text<VoltageKind>() + "; it wins over the machine file")
       ->type_name("KIND");
-  command->footer(R"(One line in, one line out, flushed, strictly alternating. In: a sample, or a block of them as arrays,
+  command->footer(
+      R"(One line in, one line out, flushed, strictly alternating. In: a sample, or a block of them as arrays,
 with the recording's column names as keys. Out: the trace's names, of the last control tick.
 
 Examples:

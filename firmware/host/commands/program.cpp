@@ -88,9 +88,10 @@ Exit refuse(std::span<const hal::host::InputError> errors) {
 }
 
 int run_program(int argc, const char* const* argv) {
-  CLI::App program{"Cutting force from the spindle motor's voltages and currents, held by the feed "
-                   "override.",
-                   "cutforce"};
+  CLI::App program{
+      "Cutting force from the spindle motor's voltages and currents, held by the feed "
+      "override.",
+      "cutforce"};
   program.footer(kFooter);
   program.require_subcommand(1);
   program.set_version_flag("--version", CUTFORCE_VERSION);

@@ -39,9 +39,8 @@ Exit write_beside(const RunSummary& summary, const std::filesystem::path& folder
 
 Exit perform(const Options& options) {
   catch_stop_signals();
-  ReplayRequest request{.recording = options.recording,
-                        .trace = options.out,
-                        .machine = options.machine.request()};
+  ReplayRequest request{
+      .recording = options.recording, .trace = options.out, .machine = options.machine.request()};
   if (options.rate_hz > 0.0) request.rate_hz = options.rate_hz;
   const auto result = replay(request);
   if (!result) return refuse(result.error());

@@ -92,7 +92,8 @@ void add_demo(CLI::App& program, Action& action) {
       ->capture_default_str();
   command->add_flag("--json", options->json, "Print the summary as JSON");
   command->add_flag("--scenario", options->scenario_text, "Print the demo's scenario instead");
-  command->footer(R"(A 5.5 kW lathe turns; the tool enters at 1 mm depth of cut, and the depth steps to 1.5 mm. The loop
+  command->footer(
+      R"(A 5.5 kW lathe turns; the tool enters at 1 mm depth of cut, and the depth steps to 1.5 mm. The loop
 estimates the cutting force from voltages, currents and speed, and holds it by the feed override.
 
 Examples:
@@ -106,11 +107,13 @@ void add_simulate(CLI::App& program, Action& action) {
       program.add_subcommand("simulate", "A scenario in closed loop: recording, trace, report");
   auto options = std::make_shared<Options>();
   command->add_option("SCENARIO", options->scenario, "Scenario file (TOML)");
-  command->add_option("--out", options->out,
-                      "Folder for the files of the run; left out: out/ and the scenario's name")
+  command
+      ->add_option("--out", options->out,
+                   "Folder for the files of the run; left out: out/ and the scenario's name")
       ->type_name("DIR");
-  command->add_option("--recording", options->recording,
-                      "Write only the recording, to this file (.csv, .csv.gz, .cfr)")
+  command
+      ->add_option("--recording", options->recording,
+                   "Write only the recording, to this file (.csv, .csv.gz, .cfr)")
       ->type_name("FILE");
   command->add_flag("--compare", options->compare,
                     "Also the estimators computed, synthesized and measured on the same samples");

@@ -15,8 +15,8 @@ using Json = nlohmann::ordered_json;
 
 // Characters, not bytes: a figure's unit may hold one that takes two.
 std::size_t width(const std::string& text) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+  return static_cast<std::size_t>(std::ranges::count_if(
+      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
 }
 
 std::string shown(const std::variant<double, std::string>& value) {

@@ -7,9 +7,11 @@ namespace cutforce::firmware::host {
 namespace {
 
 constexpr std::array<std::string_view, 10> kBlocks{
-    "the sample gate",   "the front end",     "the signal checks", "the idle calibration",
-    "the fused observer", "the torque path",  "the load friction", "the cutting force",
-    "the controller",    "the periods of estimate and control"};
+    "the sample gate",    "the front end",
+    "the signal checks",  "the idle calibration",
+    "the fused observer", "the torque path",
+    "the load friction",  "the cutting force",
+    "the controller",     "the periods of estimate and control"};
 
 }  // namespace
 

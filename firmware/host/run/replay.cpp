@@ -120,22 +120,22 @@ std::expected<void, InputError> check_names(const ReplayRequest& request) {
 RunSummary summarize(const ReplayRequest& request, const LoadedMachine& loaded,
                      const LoopRecorder& recorder, std::uint64_t samples, double seconds) {
   const Machine& machine = loaded.machine;
-  RunSummary summary{.title = "Replay of " + request.recording.filename().string(),
-                     .recording = seen_from(request.trace.parent_path(), request.recording),
-                     .traces = {{std::string(kNames<EstimatorName>[static_cast<std::size_t>(
-                                     machine.estimator)]),
-                                 request.trace.filename().string()}},
-                     .figures = {{"samples", "Samples", static_cast<double>(samples)},
-                                 {"sample_rate_hz", "Sample rate",
-                                  static_cast<double>(machine.sample_rate_hz), "Hz"}},
-                     .events = recorder.statistics().events(),
-                     .warnings = loaded.warnings,
-                     .verdict = recorder.statistics().verdict(),
-                     .machine = machine};
+  RunSummary summary{
+      .title = "Replay of " + request.recording.filename().string(),
+      .recording = seen_from(request.trace.parent_path(), request.recording),
+      .traces = {{std::string(kNames<EstimatorName>[static_cast<std::size_t>(machine.estimator)]),
+                  request.trace.filename().string()}},
+      .figures = {{"samples", "Samples", static_cast<double>(samples)},
+                  {"sample_rate_hz", "Sample rate", static_cast<double>(machine.sample_rate_hz),
+                   "Hz"}},
+      .events = recorder.statistics().events(),
+      .warnings = loaded.warnings,
+      .verdict = recorder.statistics().verdict(),
+      .machine = machine};
   const auto figures = recorder.statistics().figures(machine);
   summary.figures.insert(summary.figures.end(), figures.begin(), figures.end());
-  summary.figures.push_back({"trace_rows", "Rows of the trace",
-                             static_cast<double>(recorder.rows())});
+  summary.figures.push_back(
+      {"trace_rows", "Rows of the trace", static_cast<double>(recorder.rows())});
   summary.figures.push_back(
       {"samples_a_second", "Speed",
        std::round(static_cast<double>(samples) / std::max(seconds, 1e-6) / 1e3) / 1e3,
@@ -181,9 +181,9 @@ std::expected<ReplayResult, Errors> replay(const ReplayRequest& request) {
   if (const auto finished = recorder->finish(); !finished) return failed(finished.error());
   folder->keep();
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
-  return ReplayResult{.summary = summarize(request, setting->loaded, *recorder, watched.samples(),
-                                           took.count()),
-                      .refused = recorder->statistics().ends_refused()};
+  return ReplayResult{
+      .summary = summarize(request, setting->loaded, *recorder, watched.samples(), took.count()),
+      .refused = recorder->statistics().ends_refused()};
 }
 
 }  // namespace cutforce::firmware::host

@@ -17,8 +17,8 @@ std::string seconds_text(std::int64_t ns) {
   return text;
 }
 
-constexpr std::array<std::string_view, 5> kStateEvents{
-    "starting", "no estimate", "in air", "in the cut", "signals refused"};
+constexpr std::array<std::string_view, 5> kStateEvents{"starting", "no estimate", "in air",
+                                                       "in the cut", "signals refused"};
 
 }  // namespace
 
@@ -40,8 +40,10 @@ std::string_view fault_sentence(estimator::Fault fault) {
     case kPhaseOrder:
       return "voltages and currents do not belong together; look for swapped or reversed channels";
     case kRawPwm:
-      return "the voltages were sampled from a switching inverter without an anti-alias filter, and "
-             "no torque can be had from them; sample behind a filter, or take the drive's reference";
+      return "the voltages were sampled from a switching inverter without an anti-alias filter, "
+             "and "
+             "no torque can be had from them; sample behind a filter, or take the drive's "
+             "reference";
     case kClipped:
       return "a channel sits at the end of its range; give its sensor a larger one";
   }
@@ -178,7 +180,8 @@ std::string RunStatistics::verdict() const {
   if (ends_refused()) {
     text = "Refused: the signals cannot carry an estimate. " + text;
   } else if (torque_.count == 0) {
-    text = "There was no estimate: the machine did not turn fast enough, or not long enough. " + text;
+    text =
+        "There was no estimate: the machine did not turn fast enough, or not long enough. " + text;
   }
   return text;
 }

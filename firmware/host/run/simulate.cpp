@@ -26,9 +26,7 @@ std::string name_of(EstimatorName estimator) {
   return std::string(kNames<EstimatorName>[static_cast<std::size_t>(estimator)]);
 }
 
-std::string trace_name(EstimatorName estimator) {
-  return "trace_" + name_of(estimator) + ".csv";
-}
+std::string trace_name(EstimatorName estimator) { return "trace_" + name_of(estimator) + ".csv"; }
 
 // Another estimator that watches the same samples.
 struct Watcher {
@@ -66,15 +64,15 @@ std::expected<std::vector<Watcher>, InputError> watchers_for(
 RunSummary summarize(const Scenario& scenario, const RunStatistics& statistics,
                      const TruthScore& score, std::span<const Watcher> watchers,
                      std::uint64_t samples) {
-  RunSummary summary{.title = scenario.title,
-                     .recording = std::string(kSimulationFiles.recording),
-                     .traces = {{name_of(scenario.machine.estimator),
-                                 std::string(kSimulationFiles.trace)}},
-                     .figures = score.force_figures(scenario.machine),
-                     .events = score.events(),
-                     .warnings = scenario.warnings,
-                     .verdict = statistics.verdict(),
-                     .machine = scenario.machine};
+  RunSummary summary{
+      .title = scenario.title,
+      .recording = std::string(kSimulationFiles.recording),
+      .traces = {{name_of(scenario.machine.estimator), std::string(kSimulationFiles.trace)}},
+      .figures = score.force_figures(scenario.machine),
+      .events = score.events(),
+      .warnings = scenario.warnings,
+      .verdict = statistics.verdict(),
+      .machine = scenario.machine};
   for (const Watcher& watcher : watchers) {
     summary.traces.push_back({name_of(watcher.estimator), trace_name(watcher.estimator)});
   }
@@ -91,10 +89,10 @@ RunSummary summarize(const Scenario& scenario, const RunStatistics& statistics,
   return summary;
 }
 
-std::expected<fs::path, InputError> write_texts(const Scenario& scenario,
-                                                const RunSummary& summary, const fs::path& folder) {
-  if (auto written = write_file(folder / kSimulationFiles.machine,
-                                machine_file_text(scenario.machine));
+std::expected<fs::path, InputError> write_texts(const Scenario& scenario, const RunSummary& summary,
+                                                const fs::path& folder) {
+  if (auto written =
+          write_file(folder / kSimulationFiles.machine, machine_file_text(scenario.machine));
       !written) {
     return std::unexpected{written.error()};
   }
@@ -145,10 +143,10 @@ std::expected<SimulationResult, Errors> simulate(const Scenario& scenario, const
   for (Watcher& watcher : *watchers) {
     if (const auto finished = watcher.recorder.finish(); !finished) return failed(finished.error());
   }
-  SimulationResult result{.summary = summarize(scenario, recorder->statistics(), score, *watchers,
-                                               port.samples()),
-                          .report = {},
-                          .refused = recorder->statistics().ends_refused()};
+  SimulationResult result{
+      .summary = summarize(scenario, recorder->statistics(), score, *watchers, port.samples()),
+      .report = {},
+      .refused = recorder->statistics().ends_refused()};
   auto report = write_texts(scenario, result.summary, folder);
   if (!report) return failed(report.error());
   result.report = std::move(*report);

@@ -12,8 +12,7 @@ using hal::Signal;
 using hal::host::bit;
 using hal::host::TruthSignal;
 
-constexpr std::uint32_t kTruths = bit(TruthSignal::kAirGapTorque) |
-                                  bit(TruthSignal::kLoadTorque) |
+constexpr std::uint32_t kTruths = bit(TruthSignal::kAirGapTorque) | bit(TruthSignal::kLoadTorque) |
                                   bit(TruthSignal::kCuttingTorque) |
                                   bit(TruthSignal::kCuttingForce);
 
@@ -58,11 +57,10 @@ hal::host::RecordingLayout layout_of(const Scenario& scenario) {
   add(sensors.diameter_present, Signal::kWorkpieceDiameter);
   add(sensors.feed_rate_present, Signal::kFeedRate);
   const bool vhz = simulation.drive.control == hal::host::DriveControl::kVoltsPerHertz;
-  std::vector<hal::host::Metadata> metadata{
-      {"source", "cutforce simulate, " + scenario.title, 0},
-      {"seed", std::to_string(simulation.seed), 0},
-      {"drive", vhz ? "vhz" : "vector", 0},
-      {"voltage", voltage_text(simulation), 0}};
+  std::vector<hal::host::Metadata> metadata{{"source", "cutforce simulate, " + scenario.title, 0},
+                                            {"seed", std::to_string(simulation.seed), 0},
+                                            {"drive", vhz ? "vhz" : "vector", 0},
+                                            {"voltage", voltage_text(simulation), 0}};
   for (auto& entry : machine_metadata(scenario.machine)) metadata.push_back(std::move(entry));
   return {.metadata = std::move(metadata),
           .voltage_kind = sensors.voltage_kind,

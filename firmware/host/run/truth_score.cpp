@@ -23,14 +23,13 @@ std::string millimetres(double depth_m) {
 
 void TruthScore::add(const LoopOutput& output, const hal::host::MachineTruth& truth) {
   const bool known = (output.present & LoopOutput::kCuttingTorque) != 0;
-  rows_.push_back(
-      {.time_s = static_cast<double>(output.time_ns) * 1e-9,
-       .depth_m = truth.depth_m,
-       .true_force_n = truth.cutting_force_n,
-       .true_torque_nm = truth.cutting_torque_nm,
-       .torque_nm = known ? static_cast<double>(output.cutting_torque_nm) : kNan,
-       .sigma_nm = known ? static_cast<double>(output.cutting_torque_sigma_nm) : kNan,
-       .override_pct = static_cast<double>(output.override_pct)});
+  rows_.push_back({.time_s = static_cast<double>(output.time_ns) * 1e-9,
+                   .depth_m = truth.depth_m,
+                   .true_force_n = truth.cutting_force_n,
+                   .true_torque_nm = truth.cutting_torque_nm,
+                   .torque_nm = known ? static_cast<double>(output.cutting_torque_nm) : kNan,
+                   .sigma_nm = known ? static_cast<double>(output.cutting_torque_sigma_nm) : kNan,
+                   .override_pct = static_cast<double>(output.override_pct)});
 }
 
 std::vector<TruthScore::Stretch> TruthScore::stretches() const {
@@ -56,10 +55,10 @@ std::vector<Event> TruthScore::events() const {
     const double before_m = rows_[k - 1].depth_m;
     const double after_m = rows_[k].depth_m;
     if (std::abs(after_m - before_m) <= kJump_m) continue;
-    const std::string text = before_m == 0.0  ? "tool enters, " + millimetres(after_m) + " deep"
-                             : after_m == 0.0 ? std::string("tool leaves")
-                                              : "depth " + millimetres(before_m) + " to " +
-                                                    millimetres(after_m);
+    const std::string text = before_m == 0.0 ? "tool enters, " + millimetres(after_m) + " deep"
+                             : after_m == 0.0
+                                 ? std::string("tool leaves")
+                                 : "depth " + millimetres(before_m) + " to " + millimetres(after_m);
     events.push_back({.time_s = rows_[k].time_s, .text = text});
   }
   return events;
@@ -102,8 +101,8 @@ std::vector<Figure> TruthScore::estimate_figures(const Machine& machine) const {
       {"error_rms_pct", "Torque error, rms", 100.0 * std::sqrt(square / count) / rated_nm,
        "% of rated"},
       {"error_worst_pct", "Torque error, worst", 100.0 * worst / rated_nm, "% of rated"},
-      {"coverage_pct", "Torque error within 2 sigma", 100.0 * static_cast<double>(covered) / count, "%",
-       "of the time; 95 or more is right"}};
+      {"coverage_pct", "Torque error within 2 sigma", 100.0 * static_cast<double>(covered) / count,
+       "%", "of the time; 95 or more is right"}};
   const double lag = lag_s();
   if (std::isfinite(lag)) {
     figures.push_back({"estimate_lag_ms", "Torque estimate's lag", 1e3 * lag, "ms"});

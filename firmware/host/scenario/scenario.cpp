@@ -20,8 +20,8 @@ constexpr std::array<std::string_view, 3> kPresets{"lathe", "motor_a", "motor_b"
 constexpr std::array<std::string_view, 6> kFaultKinds{"gap",     "stuck",    "lost",
                                                       "swapped", "inverted", "absent"};
 // In the order of enum Signal.
-constexpr std::array<std::string_view, 8> kChannels{"voltage_u", "voltage_v", "voltage_w",
-                                                    "current_u", "current_v", "current_w",
+constexpr std::array<std::string_view, 8> kChannels{"voltage_u", "voltage_v",  "voltage_w",
+                                                    "current_u", "current_v",  "current_w",
                                                     "speed",     "power_meter"};
 constexpr float kLongestRunS = 36000.0F;
 
@@ -156,8 +156,8 @@ std::expected<Scenario, std::vector<InputError>> read(TomlDocument& document, st
   scenario.title = root.text("title").value_or("Simulated run");
   scenario.preset = static_cast<Preset>(root.choice("preset", kPresets).value_or(0));
   scenario.simulation = simulation_of(scenario.preset);
-  scenario.duration_s = required(
-      root, "duration_s", {.minimum = 0.01F, .maximum = kLongestRunS, .unit = "s"});
+  scenario.duration_s =
+      required(root, "duration_s", {.minimum = 0.01F, .maximum = kLongestRunS, .unit = "s"});
   read_simulation(document, scenario);
 
   MachineFile believed{};
@@ -206,8 +206,8 @@ bool is_scenario(const std::filesystem::path& path) {
   TomlSection root = (*document)->root();
   // The others are sections of a machine file too.
   constexpr std::array<std::string_view, 12> kOwn{
-      "title", "preset", "duration_s", "seed", "sample_rate_hz", "inverter",
-      "drive", "process", "feed",      "load", "sensors",        "believed"};
+      "title", "preset",  "duration_s", "seed", "sample_rate_hz", "inverter",
+      "drive", "process", "feed",       "load", "sensors",        "believed"};
   return std::ranges::any_of(kOwn, [&](std::string_view key) { return root.has(key); });
 }
 

@@ -41,8 +41,8 @@ struct Scenario {
 
 [[nodiscard]] std::expected<Scenario, std::vector<InputError>> read_scenario(
     const std::filesystem::path& path);
-[[nodiscard]] std::expected<Scenario, std::vector<InputError>> parse_scenario(
-    std::string_view text, std::string name);
+[[nodiscard]] std::expected<Scenario, std::vector<InputError>> parse_scenario(std::string_view text,
+                                                                              std::string name);
 
 // Whether a TOML file holds a scenario, not a machine: by the keys before and of its sections. No
 // scenario where it cannot be read.

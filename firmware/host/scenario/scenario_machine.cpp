@@ -22,9 +22,8 @@ void set_motor(Machine& m, const SimulatedMachineConfig& s) {
   const double star = m.winding == Winding::kDelta ? 3.0 : 1.0;
   const auto values = hal::host::inverse_gamma(s.motor, s.motor.rated_flux_vs);
   m.pole_pairs = narrow(s.motor.pole_pairs);
-  m.stator_resistance_ohm =
-      narrow(star * s.motor.stator_resistance_ohm *
-             (1.0 + s.motor.resistance_slope_1_k * s.motor.initial_rise_k));
+  m.stator_resistance_ohm = narrow(star * s.motor.stator_resistance_ohm *
+                                   (1.0 + s.motor.resistance_slope_1_k * s.motor.initial_rise_k));
   m.rotor_resistance_ohm = narrow(values.rotor_resistance_ohm);
   m.leakage_inductance_h = narrow(values.leakage_inductance_h);
   m.rated_torque_nm = narrow(s.motor.rated_torque_nm);

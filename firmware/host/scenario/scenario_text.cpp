@@ -47,8 +47,7 @@ std::string allowed(const ScenarioKey& key) {
     }
     return text;
   }
-  std::string text =
-      range_text({.minimum = key.minimum, .maximum = key.maximum, .unit = key.unit});
+  std::string text = range_text({.minimum = key.minimum, .maximum = key.maximum, .unit = key.unit});
   if (!key.over.empty()) text += ", one or as points [[" + std::string(key.over) + ", value], ...]";
   return text;
 }
