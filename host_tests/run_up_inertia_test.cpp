@@ -30,6 +30,7 @@ struct RunUp {
   double noise = 0.0;
   double sign = 1.0;
   double gap_s = -1.0;         // when the signals break off for a tick
+  double cut_s = -1.0;         // when a cut is told for a tick
 };
 
 // A run-up, 0.3 s of air, then the tare.
@@ -46,14 +47,16 @@ RunUpInertia after(const RunUp& run, const RunUpInertia::Config& config = kSpind
                 .speed_rad_s = static_cast<float>(run.sign * speed),
                 .duration_s = 1e-3F,
                 .valid = std::abs(k * 1e-3 - run.gap_s) > 5e-4,
-                .tared = false,
+                .idle = false,
+                .in_cut = std::abs(k * 1e-3 - run.cut_s) < 5e-4,
                 .tare_nm = 0.0F});
   }
   block.step({.torque_nm = 0.0F,
               .speed_rad_s = static_cast<float>(run.sign * speed),
               .duration_s = 1e-3F,
               .valid = true,
-              .tared = true,
+              .idle = true,
+              .in_cut = false,
               .tare_nm = static_cast<float>(run.sign * run.extra_friction)});
   return block;
 }
@@ -79,11 +82,10 @@ TEST(RunUpInertia, DoesNotBelieveWhatIsFarFromTheValueGiven) {
   const auto block = after({.inertia = 0.045});
   EXPECT_EQ(block.inertia_kg_m2(), 0.03F);
   EXPECT_EQ(block.sigma_ratio(), 0.15F);
-  EXPECT_EQ(block.state().closed, 1U);
 }
 
 TEST(RunUpInertia, LearnsNothingFromARunUpThatIsTooSlow) {
-  const auto block = after({.inertia = 0.033, .torque = 1.0, .ramp_s = 0.7});
+  const auto block = after({.inertia = 0.033, .torque = 0.65, .ramp_s = 0.7});
   EXPECT_EQ(block.inertia_kg_m2(), 0.03F);
 }
 
@@ -91,18 +93,36 @@ TEST(RunUpInertia, BeginsAnewAfterAGap) {
   EXPECT_NEAR(after({.inertia = 0.026, .gap_s = 0.1}).inertia_kg_m2(), 0.026, 0.03 * 0.026);
 }
 
-TEST(RunUpInertia, IsClosedByTheFirstTare) {
+TEST(RunUpInertia, ForgetsAnEpisodeThatHoldsACut) {
+  const auto block = after({.inertia = 0.026, .cut_s = 0.6});
+  EXPECT_EQ(block.inertia_kg_m2(), 0.03F);
+  EXPECT_EQ(block.sigma_ratio(), 0.15F);
+}
+
+// Idle that goes on teaches nothing more, and a change of speed between two idles confirms it.
+TEST(RunUpInertia, LearnsFromEveryChangeOfSpeedBetweenIdles) {
   auto block = after({.inertia = 0.026});
   const float found = block.inertia_kg_m2();
-  for (int k = 0; k < 1000; ++k) {
-    block.step({.torque_nm = 10.0F,
-                .speed_rad_s = 150.0F - 0.1F * static_cast<float>(k),
+  const float sigma = block.sigma_ratio();
+  double speed = 150.0;
+  for (int k = 0; k < 900; ++k) {
+    const bool braking = k >= 300 && k < 600;
+    const double friction = 0.6 + 0.002 * speed;
+    const double torque = braking ? friction - 0.026 * 250.0 : friction;
+    if (braking) speed -= 0.25;
+    block.step({.torque_nm = static_cast<float>(torque),
+                .speed_rad_s = static_cast<float>(speed),
                 .duration_s = 1e-3F,
-                .valid = k % 7 != 0,
-                .tared = k % 3 == 0,
-                .tare_nm = 0.0F});
+                .valid = true,
+                .idle = !braking,
+                .in_cut = false,
+                .tare_nm = 0.2F});
+    if (k < 300) {
+      ASSERT_EQ(block.inertia_kg_m2(), found) << k;
+    }
   }
-  EXPECT_EQ(block.inertia_kg_m2(), found);
+  EXPECT_NEAR(block.inertia_kg_m2(), 0.026, 0.01 * 0.026);
+  EXPECT_LE(block.sigma_ratio(), sigma);
 }
 
 TEST(RunUpInertia, RefusesWhatItCannotWorkWith) {
@@ -131,7 +151,8 @@ TEST(RunUpInertia, StaysWithinTwoPriorSigmasWhateverItIsGiven) {
                   .speed_rad_s = 300.0F * draw(random),
                   .duration_s = 1e-3F,
                   .valid = draw(random) < 0.95F,
-                  .tared = k == 99,
+                  .idle = draw(random) < -0.9F,
+                  .in_cut = draw(random) < -0.95F,
                   .tare_nm = draw(random)});
     }
     ASSERT_TRUE(block.inertia_kg_m2() > 0.0209F && block.inertia_kg_m2() < 0.0391F) << run;
@@ -149,7 +170,8 @@ TEST(RunUpInertia, ContinuesBitExactlyFromASnapshotWithoutAllocating) {
                                     .speed_rad_s = 0.3F * static_cast<float>(k),
                                     .duration_s = 1e-3F,
                                     .valid = k != 50,
-                                    .tared = k == 599,
+                                    .idle = k % 200 == 199,
+                                    .in_cut = k == 70,
                                     .tare_nm = 0.1F};
     original.step(input);
     resumed.step(input);

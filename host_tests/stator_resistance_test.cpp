@@ -60,6 +60,8 @@ struct Motor {
             .frequency_rad_s = static_cast<float>(frequency),
             .torque_nm = static_cast<float>(torque + change * kUsed * x + iron),
             .current_squared_a2 = static_cast<float>(squared),
+            .idle_copper_nm_ohm = static_cast<float>(
+                1.5 * flux_current * flux_current * kPolePairs / frequency),
             .duration_s = 1e-3F,
             .steady = true};
   }
@@ -166,6 +168,7 @@ TEST(StatorResistance, StaysWithinItsLimitsUnderRandomInput) {
                .frequency_rad_s = 400.0F * draw(random),
                .torque_nm = 30.0F * draw(random),
                .current_squared_a2 = 500.0F * std::abs(draw(random)),
+               .idle_copper_nm_ohm = draw(random),
                .duration_s = 1e-3F,
                .steady = true};
     }
