@@ -242,7 +242,11 @@ void ControlLoop::calibrate(const estimator::FusedObserver::Output& fused) noexc
 void ControlLoop::estimate_fused(LoopOutput& out) noexcept {
   const AirCut::Feed feed = own_.feed == 1 ? AirCut::Feed::kIdle : AirCut::Feed::kUnknown;
   const estimator::FusedObserver::Output fused = fused_.tick(feed);
-  own_.frequency_rad_s = fused.valid ? fused.frequency_rad_s : 0.0F;
+  // Without a lock the vectors do not say how fast they turn; the shaft does, where it is measured.
+  own_.frequency_rad_s = fused.frequency_rad_s;
+  if (!fused.valid && own_.speed_present != 0) {
+    own_.frequency_rad_s = own_.speed_rad_s * config_.fused.flux.pole_pairs;
+  }
   if (config_.voltage_lead_s != 0.0F) {
     const float angle = fused.frequency_rad_s * config_.voltage_lead_s;
     front_end_.set_rotation(estimator::cos_small(angle), estimator::sin_small(angle));

@@ -33,11 +33,11 @@ static_assert(kSpindle.check());
 class Spindle {
  public:
   double speed = 150.0;
-  double sense = 1.0;               // -1: turns backward, everything mirrored
+  double sense = 1.0;  // -1: turns backward, everything mirrored
   double extra_friction = 0.02 * kRated;
   double cut = 0.0;
   double noise = 0.003 * kRated;
-  double inertia_error = 0.0;       // of 0.03
+  double inertia_error = 0.0;  // of 0.03
   Feed feed = Feed::kUnknown;
   bool calibrated = true;
 

@@ -33,7 +33,8 @@ std::vector<hal::Sample> turning(std::size_t count, double rate_hz, float speed_
   for (std::size_t k = 0; k < count; ++k) {
     auto& s = samples[k];
     const double t = static_cast<double>(k) / rate_hz;
-    const auto angle = static_cast<float>(std::fmod(2.0 * std::numbers::pi * 50.0 * t, 2.0 * std::numbers::pi));
+    const auto angle =
+        static_cast<float>(std::fmod(2.0 * std::numbers::pi * 50.0 * t, 2.0 * std::numbers::pi));
     s.time_ns = static_cast<std::int64_t>(std::llround(1e9 * t));
     for (std::size_t phase = 0; phase < 3; ++phase) {
       const float shift = 2.0F * kPi / 3.0F * static_cast<float>(phase);
@@ -95,7 +96,8 @@ TEST(Conditions, AddSpeedNoiseOfTheGivenSizeAndNothingElse) {
   const auto noise = moments(after, before, [](const hal::Sample& s) { return s.speed_rad_s; });
   EXPECT_NEAR(noise.mean, 0.0, 0.001);
   EXPECT_NEAR(noise.deviation, 0.05, 0.001);
-  for (std::size_t k = 0; k < before.size(); ++k) ASSERT_EQ(after[k].voltage_v, before[k].voltage_v);
+  for (std::size_t k = 0; k < before.size(); ++k)
+    ASSERT_EQ(after[k].voltage_v, before[k].voltage_v);
 }
 
 TEST(Conditions, AreTheSameForTheSameSeedHoweverTheStreamIsCut) {
@@ -116,7 +118,7 @@ TEST(Conditions, OffsetAndNoiseArePercentOfTheRatedPeak) {
   const float current_peak_a = 5.0F * std::numbers::sqrt2_v<float>;
   const auto v = moments(after, before, [](const hal::Sample& s) { return s.voltage_v[2]; });
   const auto i = moments(after, before, [](const hal::Sample& s) { return s.current_a[1]; });
-  EXPECT_NEAR(v.mean, -3.24, 0.05);      // 1 % of 2200 W / 0.64 / (1.5 * 7.07 A) = 324 V
+  EXPECT_NEAR(v.mean, -3.24, 0.05);  // 1 % of 2200 W / 0.64 / (1.5 * 7.07 A) = 324 V
   EXPECT_NEAR(v.deviation, 1.62, 0.05);
   EXPECT_NEAR(i.mean, -0.007 * static_cast<double>(current_peak_a), 0.002);
   // Noise, and the gain error of 1 % of a sinusoid of 6 A.
@@ -186,7 +188,8 @@ TEST(Conditions, LineToLineVoltagesAndTwoCurrentsCarryTheSamePower) {
 }
 
 TEST(Conditions, ChangeTheMachineFileOnlyWhereTheySaySo) {
-  EXPECT_FLOAT_EQ(worsened(*find_condition("resistance_-40"), motor()).stator_resistance_ohm, 2.22F);
+  EXPECT_FLOAT_EQ(worsened(*find_condition("resistance_-40"), motor()).stator_resistance_ohm,
+                  2.22F);
   EXPECT_FLOAT_EQ(worsened(*find_condition("inertia_+20"), motor()).inertia_kg_m2, 0.036F);
   EXPECT_TRUE(worsened(*find_condition("resistance_+20_iron"), motor()).iron_loss_declared);
   EXPECT_FLOAT_EQ(worsened(*find_condition("voltage_+2"), motor()).stator_resistance_ohm, 3.7F);
@@ -234,7 +237,8 @@ TEST(ConditionedPort, SpoilsWhatIsReadAndPassesOnWhatIsWritten) {
   ASSERT_EQ(port.read(block).value(), 3U);
   EXPECT_FALSE(block[2].has(hal::Signal::kSpeed));
   EXPECT_EQ(port.read(block).value(), 0U);
-  ASSERT_TRUE(port.write({.time_ns = 0, .override_pct = 77, .override_code = 0, .controlling = true}));
+  ASSERT_TRUE(
+      port.write({.time_ns = 0, .override_pct = 77, .override_code = 0, .controlling = true}));
   EXPECT_EQ(inner.last, 77);
 }
 

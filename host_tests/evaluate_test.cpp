@@ -21,9 +21,13 @@ double load_nm(double t) {
 
 std::expected<EvaluationRecording, hal::host::InputError> open(const std::filesystem::path& path) {
   if (path.filename() == "broken.csv")
-    return std::unexpected(hal::host::InputError{"broken.csv:7", "no number in column i_u_a", "repair it"});
-  EvaluationRecording recording{.name = path.stem().string(), .samples = {}, .machine = {},
-                                .truth = {.time_s = {}, .torque_nm = {}, .rated_torque_nm = kRated_nm}};
+    return std::unexpected(
+        hal::host::InputError{"broken.csv:7", "no number in column i_u_a", "repair it"});
+  EvaluationRecording recording{
+      .name = path.stem().string(),
+      .samples = {},
+      .machine = {},
+      .truth = {.time_s = {}, .torque_nm = {}, .rated_torque_nm = kRated_nm}};
   recording.machine.speed_present = true;
   recording.machine.stator_resistance_ohm = 3.7F;
   recording.machine.inertia_kg_m2 = 0.03F;
@@ -54,8 +58,8 @@ std::expected<std::vector<LoopOutput>, std::string> run(std::span<const hal::Sam
     row.time_ns = sample.time_ns;
     row.state = LoopState::kCut;
     row.present = LoopOutput::kCuttingTorque;
-    row.cutting_torque_nm = static_cast<float>(fused ? load_nm(t - 0.001)
-                                                     : load_nm(t - 0.03) + (t > 1.0 ? 0.02 * kRated_nm : 0.0));
+    row.cutting_torque_nm = static_cast<float>(
+        fused ? load_nm(t - 0.001) : load_nm(t - 0.03) + (t > 1.0 ? 0.02 * kRated_nm : 0.0));
     row.cutting_torque_sigma_nm = 0.2F;
     if (estimator == EstimatorName::kSynthesized && t >= 0.2) {
       row.state = LoopState::kRefused;
@@ -73,7 +77,8 @@ EvaluationOptions only(std::vector<std::string_view> conditions) {
   return options;
 }
 
-const EvaluationRow& row_of(const Evaluation& e, std::string_view condition, std::string_view estimator) {
+const EvaluationRow& row_of(const Evaluation& e, std::string_view condition,
+                            std::string_view estimator) {
   return *std::find_if(e.rows.begin(), e.rows.end(), [&](const EvaluationRow& row) {
     return row.condition == condition && row.estimator == estimator;
   });
@@ -117,13 +122,15 @@ TEST(Evaluate, SkipsWhatCannotBeReadAndWhatHasNoTruthWithAWord) {
   ASSERT_EQ(e.skipped.size(), 2U);
   const std::string table = evaluation_table(e);
   EXPECT_NE(table.find("skipped broken.csv: no number in column i_u_a"), std::string::npos);
-  EXPECT_NE(table.find("skipped no_truth.csv: no column true_cutting_torque_nm"), std::string::npos);
+  EXPECT_NE(table.find("skipped no_truth.csv: no column true_cutting_torque_nm"),
+            std::string::npos);
 }
 
 TEST(Evaluate, PrintsLinesOfPlainTextWithTheMarksBesideThem) {
   const auto e = evaluate({"a.csv"}, only({"as_recorded", "speed_noise_0.05"}), open, run, {});
   const std::string table = evaluation_table(e);
-  EXPECT_TRUE(std::all_of(table.begin(), table.end(), [](char c) { return c == '\n' || (c >= ' ' && c < 127); }));
+  EXPECT_TRUE(std::all_of(table.begin(), table.end(),
+                          [](char c) { return c == '\n' || (c >= ' ' && c < 127); }));
   EXPECT_NE(table.find("met"), std::string::npos);
   EXPECT_NE(table.find("refused at 0.20 s: raw_pwm"), std::string::npos);
   EXPECT_NE(table.find("failed: no power meter"), std::string::npos);
@@ -131,7 +138,8 @@ TEST(Evaluate, PrintsLinesOfPlainTextWithTheMarksBesideThem) {
 }
 
 TEST(Evaluate, WritesJsonWithNullAndNeverInsteadOfNonNumbers) {
-  const auto never = [](std::span<const hal::Sample> samples, const Machine& machine, EstimatorName) {
+  const auto never = [](std::span<const hal::Sample> samples, const Machine& machine,
+                        EstimatorName) {
     auto outputs = run(samples, machine, EstimatorName::kFused);
     for (auto& row : *outputs) row.cutting_torque_nm *= 0.85F;
     return outputs;
@@ -163,7 +171,8 @@ TEST(Evaluate, FindsRecordingsInSubfoldersInOrder) {
 }
 
 TEST(Marks, AreTheGoalsOfTheConditionAndNoStricterThanTheRecordingAllows) {
-  const RecordingTraits clean{.sensor_errors = false, .pwm = false, .low_speed = false, .power_meter = true};
+  const RecordingTraits clean{
+      .sensor_errors = false, .pwm = false, .low_speed = false, .power_meter = true};
   RecordingTraits noisy = clean;
   noisy.sensor_errors = true;
   RecordingTraits slow = clean;

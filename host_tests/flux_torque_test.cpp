@@ -42,8 +42,7 @@ struct Steady {
   [[nodiscard]] MotorSample at(double time_s, Complex offset_v = {}, Complex offset_a = {}) const {
     const Complex turn = std::polar(1.0, frequency_rad_s * time_s);
     const Complex i = current_a * turn;
-    const Complex v =
-        kResistance * i + Complex(0.0, frequency_rad_s) * flux_v_s * turn + offset_v;
+    const Complex v = kResistance * i + Complex(0.0, frequency_rad_s) * flux_v_s * turn + offset_v;
     const Complex seen = i + offset_a;
     return {.voltage_v = {static_cast<float>(v.real()), static_cast<float>(v.imag())},
             .current_a = {static_cast<float>(seen.real()), static_cast<float>(seen.imag())}};
@@ -187,8 +186,7 @@ TEST(FluxTorque, FirstMomentGivesTheMeanSpeedOfTheWindow) {
       const auto w = flux.take();
       const double g = static_cast<double>(w.duration_s) / kInertia;
       const double centre = (n - 1.0) / (2.0 * n);
-      EXPECT_NEAR(mean_speed,
-                  speed - g * (static_cast<double>(w.moment_nm) - centre * kLoad), 2e-5)
+      EXPECT_NEAR(mean_speed, speed - g * (static_cast<double>(w.moment_nm) - centre * kLoad), 2e-5)
           << n << ' ' << window;
     }
   }

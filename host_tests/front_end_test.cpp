@@ -68,9 +68,7 @@ FrontEnd::Input channels(const Wires& w, VoltageChannels kind) {
   return in;
 }
 
-double dot_power(const Wires& w) {
-  return w.v[0] * w.i[0] + w.v[1] * w.i[1] + w.v[2] * w.i[2];
-}
+double dot_power(const Wires& w) { return w.v[0] * w.i[0] + w.v[1] * w.i[1] + w.v[2] * w.i[2]; }
 
 double vector_power(const MotorSample& s) {
   return 1.5 * static_cast<double>(estimator::dot(s.voltage_v, s.current_a));
@@ -135,7 +133,8 @@ TEST(FrontEnd, MeetsTheInstantaneousRmsIdentityAndTurnsBalancedSetsIntoOneLength
   const auto block = FrontEnd::make(kStar).value();
   for (double angle = 0.0; angle < 6.28; angle += 0.01) {
     const Wires w = balanced(325.0, 7.0, angle, 0.6);
-    ASSERT_NEAR(w.v[0] * w.v[0] + w.v[1] * w.v[1] + w.v[2] * w.v[2], 1.5 * 325.0 * 325.0, 1e-9 * 1e5);
+    ASSERT_NEAR(w.v[0] * w.v[0] + w.v[1] * w.v[1] + w.v[2] * w.v[2], 1.5 * 325.0 * 325.0,
+                1e-9 * 1e5);
     const auto out = block.step(channels(w, kStar.voltages));
     ASSERT_NEAR(out.motor.voltage_v.alpha, 325.0 * std::cos(angle), 1e-4);
     ASSERT_NEAR(out.motor.voltage_v.beta, 325.0 * std::sin(angle), 1e-4);
@@ -161,10 +160,10 @@ TEST(FrontEnd, UndoesGainOffsetAndLeadOfTheSensors) {
         const Wires ahead = balanced(300.0, 5.0, angle + kLead, 0.9);
         FrontEnd::Input in = channels({ahead.v, now.i}, kind);
         for (std::size_t k = 0; k < 3; ++k) {
-          in.voltage_v[k] = in.voltage_v[k] / calibration.voltage_gain_ratio[k] +
-                            calibration.voltage_offset_v[k];
-          in.current_a[k] = in.current_a[k] / calibration.current_gain_ratio[k] +
-                            calibration.current_offset_a[k];
+          in.voltage_v[k] =
+              in.voltage_v[k] / calibration.voltage_gain_ratio[k] + calibration.voltage_offset_v[k];
+          in.current_a[k] =
+              in.current_a[k] / calibration.current_gain_ratio[k] + calibration.current_offset_a[k];
         }
         const auto out = block.step(in);
         ASSERT_NEAR(out.motor.voltage_v.alpha, 300.0 * std::cos(angle), 2e-4);

@@ -111,8 +111,8 @@ Run run(const SimulatedMachineConfig& machine, const FusedObserver::Config& conf
   auto observer = FusedObserver::make(config).value();
   const auto rows = run_open_loop(machine, 6.0);
   const auto ticks = static_cast<std::size_t>(machine.sample_rate_hz / 1000.0 + 0.5);
-  firmware::host::TruthSeries truth{.time_s = {}, .torque_nm = {},
-                                    .rated_torque_nm = machine.motor.rated_torque_nm};
+  firmware::host::TruthSeries truth{
+      .time_s = {}, .torque_nm = {}, .rated_torque_nm = machine.motor.rated_torque_nm};
   firmware::host::EstimateSeries estimate;
   Run result{};
   for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -155,8 +155,8 @@ TEST(FusedObserver, ReachesTheMarksOnCleanSignalsOfBothMotors) {
     for (const auto& motor : {hal::host::motor_a(), hal::host::motor_b()}) {
       const auto machine = stepped(motor, rate_hz);
       const auto result = run(machine, config_of(machine));
-      SCOPED_TRACE(std::to_string(rate_hz) + " Hz, " +
-                   std::to_string(motor.motor.rated_torque_nm) + " N m");
+      SCOPED_TRACE(std::to_string(rate_hz) + " Hz, " + std::to_string(motor.motor.rated_torque_nm) +
+                   " N m");
       expect_marks(result.metrics, {0.05, 0.03, 1.2, 1.2, 2.0, 95.0});
       EXPECT_LT(result.invalid_s, 0.5);
     }
@@ -179,7 +179,8 @@ TEST(FusedObserver, ReachesTheMarksWithNoiseOnSpeedAndChannels) {
     auto machine = stepped(hal::host::motor_a(), rate_hz);
     // White noise of one 1 ms mean, whatever the rate.
     machine.sensors.speed.noise_rad_s = 0.05 * std::sqrt(rate_hz / 1000.0);
-    for (auto& channel : machine.sensors.voltage) channel = {.noise = 1.6, .range = 800, .bits = 12};
+    for (auto& channel : machine.sensors.voltage)
+      channel = {.noise = 1.6, .range = 800, .bits = 12};
     for (auto& channel : machine.sensors.current) {
       channel = {.noise = 0.035, .range = 28.3, .bits = 12};
     }
@@ -290,15 +291,16 @@ TEST(FusedObserver, StaysFiniteUnderRandomSignalsAndFindsTheTorqueAfterwards) {
       if (k % 500 == 0) frequency = 700.0F * draw(random);
       turn = std::remainder(turn + frequency * 1e-3F, 2.0F * std::numbers::pi_v<float>);
       const float rest = k % 1000 < 700 ? 0.05F : 1.0F;
-      observer.step({.motor = {.voltage_v = {600.0F * scale * (std::cos(turn) + rest * draw(random)),
-                                             600.0F * scale * (std::sin(turn) + rest * draw(random))},
-                               .current_a = {50.0F * scale * (std::cos(turn) + rest * draw(random)),
-                                             50.0F * scale * (std::sin(turn) + rest * draw(random))}},
-                     .speed_rad_s = 0.5F * frequency + 20.0F * rest * draw(random),
-                     .power_meter_w = 5000.0F * draw(random),
-                     .elapsed_periods = k % 97 == 0 ? 3.0F : 1.0F,
-                     .speed_valid = draw(random) < 0.9F,
-                     .meter_valid = draw(random) < 0.5F});
+      observer.step(
+          {.motor = {.voltage_v = {600.0F * scale * (std::cos(turn) + rest * draw(random)),
+                                   600.0F * scale * (std::sin(turn) + rest * draw(random))},
+                     .current_a = {50.0F * scale * (std::cos(turn) + rest * draw(random)),
+                                   50.0F * scale * (std::sin(turn) + rest * draw(random))}},
+           .speed_rad_s = 0.5F * frequency + 20.0F * rest * draw(random),
+           .power_meter_w = 5000.0F * draw(random),
+           .elapsed_periods = k % 97 == 0 ? 3.0F : 1.0F,
+           .speed_valid = draw(random) < 0.9F,
+           .meter_valid = draw(random) < 0.5F});
       if (k % 20011 == 0) observer.restart();
       const auto out = observer.tick(static_cast<AirCut::Feed>(k / 3000 % 3));
       ASSERT_TRUE(std::isfinite(out.airgap_torque_nm) && std::isfinite(out.load_torque_nm)) << k;

@@ -72,8 +72,7 @@ constexpr Defects kDefects{.offset = {3.2, -2.0, 1.1, 0.07, -0.05, 0.03},
 TEST(IdleCalibration, FindsOffsetsAndGainsAtAnyRateSpeedAndInBothDirections) {
   for (const float rate_hz : {1000.0F, 5000.0F, 20000.0F}) {
     for (const double hz : {10.0, 33.3, 50.0, 99.0, -50.0}) {
-      const auto found =
-          calibrate(config_at(rate_hz), 2.0 * std::numbers::pi * hz, kDefects, 1);
+      const auto found = calibrate(config_at(rate_hz), 2.0 * std::numbers::pi * hz, kDefects, 1);
       for (std::size_t k = 0; k < 6; ++k) {
         const double peak = k < 3 ? 300.0 : 3.5;
         EXPECT_NEAR(found.offset[k], kDefects.offset[k], 1e-4 * peak) << rate_hz << ' ' << hz;
@@ -103,8 +102,8 @@ TEST(IdleCalibration, ScattersAsTheNoisePredicts) {
   double offset_squares = 0.0;
   double gain_squares = 0.0;
   for (int run = 0; run < kRuns; ++run) {
-    const auto found = calibrate(config_at(1000.0F), 314.159, defects,
-                                 static_cast<std::uint32_t>(100 + run));
+    const auto found =
+        calibrate(config_at(1000.0F), 314.159, defects, static_cast<std::uint32_t>(100 + run));
     const double offset = static_cast<double>(found.offset[3]) - defects.offset[3];
     const double gain = static_cast<double>(found.gain[3]) - defects.gain[3];
     offset_squares += offset * offset;
@@ -113,7 +112,8 @@ TEST(IdleCalibration, ScattersAsTheNoisePredicts) {
   const double predicted = 0.035 * std::sqrt(1.5 / 300.0);
   const double measured = std::sqrt(offset_squares / kRuns);
   EXPECT_NEAR(measured, predicted, 0.2 * predicted);
-  // A phasor scatters by sqrt(2) sigma sqrt(1.5/N) in each part, and with it gains: EQUATIONS (E82).
+  // A phasor scatters by sqrt(2) sigma sqrt(1.5/N) in each part, and with it gains: EQUATIONS
+  // (E82).
   const double gain_predicted = std::sqrt(2.0) * predicted / 3.5 * std::sqrt(4.0 / 3.0);
   EXPECT_NEAR(std::sqrt(gain_squares / kRuns), gain_predicted, 0.2 * gain_predicted);
 }

@@ -185,7 +185,8 @@ TEST(LoadTorqueFilter, AgreesWithAKalmanFilterInMatricesForBothKindsOfNoise) {
       reference.step(input, noise);
       // Single precision loses most where the first wide uncertainty collapses.
       const double share = k < 20 ? 3e-3 : 5e-4;
-      ASSERT_NEAR(output.load_torque_nm, reference.torque(), share * kRated) << of_angle << ' ' << k;
+      ASSERT_NEAR(output.load_torque_nm, reference.torque(), share * kRated)
+          << of_angle << ' ' << k;
       ASSERT_NEAR(std::sqrt(output.variance_nm2), std::sqrt(reference.variance()), share * kRated)
           << of_angle << ' ' << k;
     }
@@ -223,8 +224,8 @@ TEST(LoadTorqueFilter, WithoutAngleNoiseIsTheTwoStateFilterOnSpeed) {
     p = f * p * f.transpose() + q * q * drift * drift.transpose() + 1e-3 * push * push.transpose();
     const Eigen::RowVector2d h(1.0, g * k);
     const Eigen::Vector2d shared = -1e-3 * g * k * push;
-    const double s = (h * p * h.transpose())(0) + 2.0 * (h * shared)(0) + 1e-3 * g * g * k * k +
-                     2.5e-3;
+    const double s =
+        (h * p * h.transpose())(0) + 2.0 * (h * shared)(0) + 1e-3 * g * g * k * k + 2.5e-3;
     const Eigen::Vector2d gain = (p * h.transpose() + shared) / s;
     x += gain * (static_cast<double>(input.speed_rad_s) - ((h * x)(0) - g * moment));
     p -= s * gain * gain.transpose();

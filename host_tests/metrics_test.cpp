@@ -83,8 +83,8 @@ TEST(LoadProfile, TellsAStepARampAndADriftApart) {
 }
 
 TEST(LoadProfile, TakesARampUpAndDownWithoutAStopForTwoRamps) {
-  const auto profile = find_load_profile(truth_of(
-      [](double t) { return 12.0 * (edge(t, 1.0, 0.8) - edge(t, 1.8, 0.8)); }, 3.5));
+  const auto profile = find_load_profile(
+      truth_of([](double t) { return 12.0 * (edge(t, 1.0, 0.8) - edge(t, 1.8, 0.8)); }, 3.5));
   ASSERT_EQ(profile.ramps.size(), 2U);
   EXPECT_NEAR(profile.ramps[0].after_nm, 12.0, 0.1);
   EXPECT_NEAR(profile.ramps[1].to_s, 2.6, 0.01);
@@ -124,8 +124,10 @@ TEST(LoadProfile, CountsAnInterruptedCutAsOneToneWithoutItsHarmonics) {
 }
 
 TEST(LoadProfile, SurvivesTruthsWithNothingInThem) {
-  EXPECT_TRUE(find_load_profile({.time_s = {}, .torque_nm = {}, .rated_torque_nm = 1.0}).plateaus.empty());
-  EXPECT_TRUE(find_load_profile({.time_s = {0.0}, .torque_nm = {1.0}, .rated_torque_nm = 1.0}).plateaus.empty());
+  EXPECT_TRUE(
+      find_load_profile({.time_s = {}, .torque_nm = {}, .rated_torque_nm = 1.0}).plateaus.empty());
+  EXPECT_TRUE(find_load_profile({.time_s = {0.0}, .torque_nm = {1.0}, .rated_torque_nm = 1.0})
+                  .plateaus.empty());
   const auto idle = find_load_profile(truth_of([](double) { return 0.0; }, 2.0));
   ASSERT_EQ(idle.plateaus.size(), 1U);
   EXPECT_TRUE(idle.steps.empty());
@@ -161,11 +163,11 @@ TEST(Metrics, MeasureADelayToAHundredthOfAMillisecond) {
 TEST(Metrics, MeasureTheLagOfAFirstOrderFilter) {
   const auto truth = truth_of([](double t) { return 8.0 * edge(t, 2.0, 1e-3); }, 4.0);
   constexpr double kTau_s = 0.05;
-  const auto m = score(truth, estimate_of(
-                                  [](double t) {
-                                    return t < 2.0005 ? 0.0 : 8.0 * (1.0 - std::exp((2.0005 - t) / kTau_s));
-                                  },
-                                  4.0, 0.1));
+  const auto m = score(
+      truth,
+      estimate_of(
+          [](double t) { return t < 2.0005 ? 0.0 : 8.0 * (1.0 - std::exp((2.0005 - t) / kTau_s)); },
+          4.0, 0.1));
   EXPECT_NEAR(*m.t50_ms, 1e3 * kTau_s * std::log(2.0), 0.1);
   EXPECT_NEAR(*m.t90_ms, 1e3 * kTau_s * std::log(10.0) - 0.4, 0.1);  // the edge itself takes 1 ms
   EXPECT_LT(*m.overshoot_pct, 1e-6);
@@ -176,10 +178,14 @@ TEST(Metrics, SplitBiasFromNoise) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> noise(0.0, 0.1);
   const auto m = score(
-      truth, estimate_of([&](double t) { return entry_and_exit_nm(t) + 0.06 + noise(random); }, 4.6, 0.1));
+      truth,
+      estimate_of([&](double t) { return entry_and_exit_nm(t) + 0.06 + noise(random); }, 4.6, 0.1));
   EXPECT_NEAR(*m.steady_error_pct, 0.3, 0.08);  // 0.1/20/sqrt(300 samples) = 0.03 %, worst of three
   EXPECT_NEAR(*m.noise_pct, 0.5, 0.06);
-  EXPECT_NEAR(*m.coverage_pct, 100.0 * 0.5 * (std::erf(1.4 / std::numbers::sqrt2) + std::erf(2.6 / std::numbers::sqrt2)), 1.5);
+  EXPECT_NEAR(
+      *m.coverage_pct,
+      100.0 * 0.5 * (std::erf(1.4 / std::numbers::sqrt2) + std::erf(2.6 / std::numbers::sqrt2)),
+      1.5);
 }
 
 TEST(Metrics, CountTheTwoSigmaCoverageOfHonestNoise) {
@@ -189,14 +195,16 @@ TEST(Metrics, CountTheTwoSigmaCoverageOfHonestNoise) {
     std::mt19937_64 random(2);
     std::normal_distribution<double> noise(0.0, 0.1);
     const auto m = score(
-        truth, estimate_of([&](double t) { return entry_and_exit_nm(t) + noise(random); }, 4.6, sigma_nm));
+        truth,
+        estimate_of([&](double t) { return entry_and_exit_nm(t) + noise(random); }, 4.6, sigma_nm));
     EXPECT_NEAR(*m.coverage_pct, 100.0 * std::erf(2.0 * sigma_nm / 0.1 / std::numbers::sqrt2), 1.5);
   }
 }
 
 TEST(Metrics, CountAScaleErrorBothAsSteadyErrorAndAsOvershoot) {
   const auto truth = truth_of(entry_and_exit_nm, 4.6);
-  const auto m = score(truth, estimate_of([](double t) { return 1.02 * entry_and_exit_nm(t); }, 4.6, 0.1));
+  const auto m =
+      score(truth, estimate_of([](double t) { return 1.02 * entry_and_exit_nm(t); }, 4.6, 0.1));
   EXPECT_NEAR(*m.steady_error_pct, 1.2, 1e-6);  // 2 % of 60 %
   EXPECT_NEAR(*m.overshoot_pct, 6.0, 1e-6);     // 1.2 % above the truth after a step of 20 %
 }
@@ -215,7 +223,8 @@ TEST(Metrics, MeasureOvershootInPercentOfTheStep) {
 
 TEST(Metrics, SayNeverWhereAnEstimateDoesNotReachTheStep) {
   const auto truth = truth_of(entry_and_exit_nm, 4.6);
-  const auto m = score(truth, estimate_of([](double t) { return 0.8 * entry_and_exit_nm(t); }, 4.6, 0.1));
+  const auto m =
+      score(truth, estimate_of([](double t) { return 0.8 * entry_and_exit_nm(t); }, 4.6, 0.1));
   ASSERT_EQ(m.steps.size(), 3U);
   EXPECT_LT(m.steps[0].t50_ms, 10.0);
   EXPECT_TRUE(std::isinf(*m.t90_ms));
@@ -232,7 +241,9 @@ TEST(Metrics, MeasureTheLagAndTheErrorOfARamp) {
 }
 
 TEST(Metrics, MeasureTheGainAndDelayOfATone) {
-  const auto load = [](double t) { return t < 1.0 ? 0.0 : 8.0 + 2.0 * std::sin(kTwoPi * 15.0 * t); };
+  const auto load = [](double t) {
+    return t < 1.0 ? 0.0 : 8.0 + 2.0 * std::sin(kTwoPi * 15.0 * t);
+  };
   const auto truth = truth_of(load, 4.0);
   constexpr double kTau_s = 0.002;  // first-order lag: gain 1/sqrt(1+(w tau)^2), phase atan(w tau)
   const double w_tau = kTwoPi * 15.0 * kTau_s;

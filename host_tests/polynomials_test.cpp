@@ -32,7 +32,8 @@ constexpr std::uint32_t kStride = 251;
 
 enum class Kind : std::uint8_t { kAbsolute, kRelative };
 
-// Largest error over the floats from `from` to `to`, both positive, the library's double being true.
+// Largest error over the floats from `from` to `to`, both positive, the library's double being
+// true.
 template <class Ours, class True>
 double worst_error(float from, float to, std::uint32_t stride, Kind kind, Ours ours, True is) {
   double worst = 0.0;
@@ -55,23 +56,23 @@ double worst_up_to(float to, Kind kind, Ours ours, True is) {
 }
 
 // Bounds as stated in the header, held from below too, so that they stay honest numbers.
-#define EXPECT_BOUND(error, bound)     \
-  do {                                 \
-    const double measured = (error);   \
-    EXPECT_LE(measured, (bound));      \
+#define EXPECT_BOUND(error, bound)      \
+  do {                                  \
+    const double measured = (error);    \
+    EXPECT_LE(measured, (bound));       \
     EXPECT_GT(measured, 0.7 * (bound)); \
   } while (false)
 
 TEST(Polynomials, AtanStaysWithinItsBound) {
-  EXPECT_BOUND(worst_up_to(0.41421356F, Kind::kAbsolute, atan_small,
-                           [](double x) { return std::atan(x); }),
-               3e-8);
+  EXPECT_BOUND(
+      worst_up_to(0.41421356F, Kind::kAbsolute, atan_small, [](double x) { return std::atan(x); }),
+      3e-8);
 }
 
 TEST(Polynomials, TanStaysWithinItsBound) {
-  EXPECT_BOUND(worst_up_to(1.0F, Kind::kRelative, tan_over_x,
-                           [](double x) { return std::tan(x) / x; }),
-               4e-7);
+  EXPECT_BOUND(
+      worst_up_to(1.0F, Kind::kRelative, tan_over_x, [](double x) { return std::tan(x) / x; }),
+      4e-7);
   EXPECT_EQ(tan_over_x(0.0F), 1.0F);
   EXPECT_EQ(tan_over_x(-0.7F), tan_over_x(0.7F));
 }
@@ -85,11 +86,11 @@ TEST(Polynomials, SineAndCosineStayWithinTheirBound) {
 }
 
 TEST(Polynomials, ExponentialStaysWithinItsBoundOnBothSides) {
-  EXPECT_BOUND(worst_up_to(87.0F, Kind::kRelative, exp_bounded,
-                           [](double x) { return std::exp(x); }),
-               9e-8);
-  EXPECT_BOUND(worst_up_to(87.0F, Kind::kRelative, [](float x) { return exp_bounded(-x); },
-                           [](double x) { return std::exp(-x); }),
+  EXPECT_BOUND(
+      worst_up_to(87.0F, Kind::kRelative, exp_bounded, [](double x) { return std::exp(x); }), 9e-8);
+  EXPECT_BOUND(worst_up_to(
+                   87.0F, Kind::kRelative, [](float x) { return exp_bounded(-x); },
+                   [](double x) { return std::exp(-x); }),
                9e-8);
 }
 

@@ -24,7 +24,7 @@ static_assert(kMeter.check());
 
 // The drive's meter: true power behind a first-order lag, and its noise.
 struct Drive {
-  double scale = 1.0;      // true power over computed
+  double scale = 1.0;  // true power over computed
   double lag = 0.3;
   double noise_w = 0.0;
   double reading = 0.0;

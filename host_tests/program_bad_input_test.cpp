@@ -51,8 +51,8 @@ TEST(BadRecording, IsRefusedAndLeavesNoTrace) {
       {"other version", "# cutforce recording 2\n" + kNames + good_rows(9), ":1:"},
       {"no table at all", "\x7f\x45\x4c\x46\x01\x02", ":1:1"},
       {"missing column", recording("t_s,v_un_v,v_vn_v,v_wn_v,i_u_a\n", "0,1,2,3,4\n"), "i_v_a"},
-      {"doubled column", recording("t_s,v_un_v,v_vn_v,v_wn_v,i_u_a,i_v_a,i_v_a\n", "0,1,2,3,4,5,6\n"),
-       ":6:"},
+      {"doubled column",
+       recording("t_s,v_un_v,v_vn_v,v_wn_v,i_u_a,i_v_a,i_v_a\n", "0,1,2,3,4,5,6\n"), ":6:"},
       {"both voltages",
        recording("t_s,v_un_v,v_vn_v,v_wn_v,v_uv_v,v_vw_v,v_wu_v,i_u_a,i_v_a\n",
                  "0,1,2,3,4,5,6,7,8\n"),
@@ -68,7 +68,8 @@ TEST(BadRecording, IsRefusedAndLeavesNoTrace) {
       {"negative inertia", recording(kNames, good_rows(9), kMetadata + "# inertia_kg_m2: -1\n"),
        "inertia_kg_m2"},
       {"one row and no rate",
-       recording(kNames, good_rows(1), "# pole_pairs: 2\n# rated_power_w: 2200\n"), "sample_rate_hz"},
+       recording(kNames, good_rows(1), "# pole_pairs: 2\n# rated_power_w: 2200\n"),
+       "sample_rate_hz"},
   };
   for (const BadRecording& bad : table) {
     SCOPED_TRACE(bad.name);
@@ -91,7 +92,7 @@ TEST(BadRecording, LeavesAnEarlierTraceAsItWas) {
   const ScratchFolder folder;
   const auto file = folder.write("bad.csv", recording(kNames, good_rows(2000) + "2,1,2,x,4,5,6\n"));
   const auto trace = folder.write("x.csv", "precious");
-  expect_refused(folder, "replay " + q(file) + " --out " + q(trace), ":2006:");
+  expect_refused(folder, "replay " + q(file) + " --out " + q(trace), ":2007:");
   EXPECT_EQ(bytes_of(trace), "precious");
 }
 
@@ -121,9 +122,10 @@ TEST(BadMachineFile, IsRefusedBeforeAnythingIsWritten) {
     const ScratchFolder folder;
     const auto machine = folder.write("machine.toml", text);
     const auto file = folder.write("good.csv", recording(kNames, good_rows(2000)));
-    expect_refused(folder, "replay " + q(file) + " --machine " + q(machine) + " --out " +
-                               q(folder.file("x.csv")),
-                   says);
+    expect_refused(
+        folder,
+        "replay " + q(file) + " --machine " + q(machine) + " --out " + q(folder.file("x.csv")),
+        says);
   }
 }
 
@@ -161,7 +163,8 @@ TEST(BadOutput, IsRefusedWhereItCannotBe) {
   expect_refused(folder, "demo --out " + q(file / "demo"), "cannot be made");
   expect_refused(folder, "replay " + committed("vhz") + " --out " + q(file / "x" / "x.csv"),
                  "cannot be made");
-  expect_refused(folder, "convert " + committed("vhz") + " " + q(folder.file("no/x.csv")), "written");
+  expect_refused(folder, "convert " + committed("vhz") + " " + q(folder.file("no/x.csv")),
+                 "written");
 }
 
 TEST(Stopping, LeavesNothingBehind) {

@@ -47,9 +47,8 @@ TEST(Simulate, RecordsWhatReplaysToTheSameTrace) {
   const auto run = folder.file("run");
   ASSERT_EQ(cutforce("simulate " + q(scenario) + " --out " + q(run)).exit_status, 0);
   const auto again = folder.file("again.csv");
-  const auto replayed =
-      cutforce("replay " + q(run / "recording.csv.gz") + " --machine " + q(run / "machine.toml") +
-               " --rate 1000 --out " + q(again));
+  const auto replayed = cutforce("replay " + q(run / "recording.csv.gz") + " --machine " +
+                                 q(run / "machine.toml") + " --rate 1000 --out " + q(again));
   ASSERT_EQ(replayed.exit_status, 0) << replayed.output;
   EXPECT_EQ(bytes_of(run / "trace.csv"), bytes_of(again));
 }
@@ -68,8 +67,7 @@ TEST(Simulate, MakesTheCommittedRecordings) {
 }
 
 TEST(Simulate, HasTheDemoAmongItsScenarios) {
-  EXPECT_EQ(bytes_of(in_tests("scenarios/demo_step.toml")),
-            firmware::host::demo_scenario_text());
+  EXPECT_EQ(bytes_of(in_tests("scenarios/demo_step.toml")), firmware::host::demo_scenario_text());
 }
 
 // What a person believes of the machine need not be so.
@@ -91,14 +89,13 @@ TEST(Simulate, ReadsEveryKeyOfItsTemplateBack) {
     const std::string text = firmware::host::scenario_template(preset);
     const auto scenario = firmware::host::parse_scenario(text, "template");
     ASSERT_TRUE(scenario) << scenario.error().front().text();
-    EXPECT_EQ(scenario->machine, firmware::host::machine_of(
-                                     firmware::host::simulation_of(preset), preset));
+    EXPECT_EQ(scenario->machine,
+              firmware::host::machine_of(firmware::host::simulation_of(preset), preset));
   }
 }
 
 TEST(Evaluate, ReadsTheCommittedRecordings) {
-  const auto result =
-      cutforce_output("evaluate --json --quick " + q(in_tests("recordings")));
+  const auto result = cutforce_output("evaluate --json --quick " + q(in_tests("recordings")));
   ASSERT_EQ(result.exit_status, 0);
   const json figures = json::parse(result.output);
   EXPECT_FALSE(figures.empty());

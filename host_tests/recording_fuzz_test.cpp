@@ -44,12 +44,24 @@ std::string mutated(std::string bytes, std::mt19937& random) {
   const auto place = [&] { return bytes.empty() ? 0 : random() % bytes.size(); };
   for (auto edits = 1 + random() % 4; edits > 0 && !bytes.empty(); --edits) {
     switch (random() % 6) {
-      case 0: bytes[place()] = static_cast<char>(random()); break;
-      case 1: bytes[place()] = kNasty[random() % kNasty.size()]; break;
-      case 2: bytes.insert(place(), 1, kNasty[random() % kNasty.size()]); break;
-      case 3: bytes.erase(place(), 1 + random() % 20); break;
-      case 4: bytes.resize(place()); break;
-      default: bytes.insert(place(), bytes.substr(place(), random() % 60)); break;
+      case 0:
+        bytes[place()] = static_cast<char>(random());
+        break;
+      case 1:
+        bytes[place()] = kNasty[random() % kNasty.size()];
+        break;
+      case 2:
+        bytes.insert(place(), 1, kNasty[random() % kNasty.size()]);
+        break;
+      case 3:
+        bytes.erase(place(), 1 + random() % 20);
+        break;
+      case 4:
+        bytes.resize(place());
+        break;
+      default:
+        bytes.insert(place(), bytes.substr(place(), random() % 60));
+        break;
     }
   }
   return bytes;

@@ -28,14 +28,16 @@ namespace fs = std::filesystem;
 constexpr const char* kTraceHeader =
     "# cutforce trace 1\n"
     "t_s,airgap_power_w,measured_power_w,airgap_torque_nm,load_torque_nm,cutting_torque_nm,"
-    "cutting_torque_sigma_nm,cutting_force_n,cutting_force_sigma_n,source,override_pct,state,fault\n";
+    "cutting_torque_sigma_nm,cutting_force_n,cutting_force_sigma_n,source,override_pct,state,"
+    "fault\n";
 
 // A run directory that goes away with the test.
 class Report : public testing::Test {
  protected:
   void SetUp() override {
-    dir_ = fs::temp_directory_path() /
-           (std::string("cutforce_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    dir_ =
+        fs::temp_directory_path() /
+        (std::string("cutforce_") + testing::UnitTest::GetInstance()->current_test_info()->name());
     fs::remove_all(dir_);
     fs::create_directories(dir_);
   }
@@ -59,7 +61,8 @@ class Report : public testing::Test {
   void write_run() const {
     write("trace.csv", trace_text(100, 0.001));
     write("slow.csv", trace_text(2, 0.05));
-    std::string recording = "# cutforce recording 1\nt_s,i_u_a,true_cutting_force_n,true_cutting_torque_nm\n";
+    std::string recording =
+        "# cutforce recording 1\nt_s,i_u_a,true_cutting_force_n,true_cutting_torque_nm\n";
     for (int k = 0; k <= 500; ++k)
       recording += std::to_string(0.0002 * k) + ",1," + (k > 250 ? "200,5\n" : "0,0\n");
     const gzFile file = gzopen((dir_ / "recording.csv.gz").c_str(), "wb");
@@ -90,7 +93,8 @@ std::string between(const std::string& text, const std::string& from, const std:
 }
 
 nlohmann::json embedded(const std::string& page) {
-  return nlohmann::json::parse(between(page, R"(<script type="application/json" id="run">)", "</script>"), nullptr, false);
+  return nlohmann::json::parse(
+      between(page, R"(<script type="application/json" id="run">)", "</script>"), nullptr, false);
 }
 
 template <class T>
@@ -144,9 +148,11 @@ TEST_F(Report, PointsNowhereOutside) {
   write_run();
   std::string text = page();
   // The plotting library's banner and its licence name their origin; nothing follows that.
-  for (auto at = text.find("https://github.com/leeoniya/uPlot"); at != std::string::npos; at = text.find("https://github.com/leeoniya/uPlot"))
+  for (auto at = text.find("https://github.com/leeoniya/uPlot"); at != std::string::npos;
+       at = text.find("https://github.com/leeoniya/uPlot"))
     text.erase(at, std::strlen("https://github.com/leeoniya/uPlot"));
-  for (const auto* trace : {"http://", "https://", "//cdn", "@import", "url(", "<link", "src=\"", "fetch(", "XMLHttpRequest", "WebSocket", "sourceMappingURL"})
+  for (const auto* trace : {"http://", "https://", "//cdn", "@import", "url(", "<link", "src=\"",
+                            "fetch(", "XMLHttpRequest", "WebSocket", "sourceMappingURL"})
     EXPECT_EQ(text.find(trace), std::string::npos) << trace;
   EXPECT_NE(text.find("default-src 'none'"), std::string::npos);
 }
@@ -154,7 +160,8 @@ TEST_F(Report, PointsNowhereOutside) {
 TEST_F(Report, ShowsTextsAndObeysNoMarkupInThem) {
   write_run();
   const std::string text = page();
-  EXPECT_NE(text.find("<h1>A &lt;b&gt;bold&lt;/b&gt; &amp; &quot;quoted&quot; cut</h1>"), std::string::npos);
+  EXPECT_NE(text.find("<h1>A &lt;b&gt;bold&lt;/b&gt; &amp; &quot;quoted&quot; cut</h1>"),
+            std::string::npos);
   EXPECT_NE(text.find("lag &lt;i&gt;"), std::string::npos);
   for (const auto* markup : {"<b>", "<i>", "<u>", "<img", "<script>alert"})
     EXPECT_EQ(text.find(markup), std::string::npos) << markup;
@@ -167,10 +174,11 @@ TEST_F(Report, HoldsEverySeriesAsItWasInTheFiles) {
   write_run();
   const auto data = embedded(page());
   ASSERT_FALSE(data.is_discarded());
-  for (const auto* key : {"0.airgap_power_w", "0.measured_power_w", "0.airgap_torque_nm", "0.load_torque_nm",
-                          "0.cutting_torque_nm", "0.cutting_torque_sigma_nm", "0.cutting_force_n",
-                          "0.cutting_force_sigma_n", "0.override_pct", "1.cutting_force_n", "1.cutting_torque_sigma_nm",
-                          "r.true_cutting_force_n", "r.true_cutting_torque_nm"}) {
+  for (const auto* key :
+       {"0.airgap_power_w", "0.measured_power_w", "0.airgap_torque_nm", "0.load_torque_nm",
+        "0.cutting_torque_nm", "0.cutting_torque_sigma_nm", "0.cutting_force_n",
+        "0.cutting_force_sigma_n", "0.override_pct", "1.cutting_force_n",
+        "1.cutting_torque_sigma_nm", "r.true_cutting_force_n", "r.true_cutting_torque_nm"}) {
     ASSERT_TRUE(data["series"].contains(key)) << key;
     EXPECT_EQ(decoded<float>(data["series"][key]).size(), 100U) << key;
   }
@@ -208,7 +216,8 @@ TEST_F(Report, HasATableOfFiguresAndMachineParameters) {
 TEST_F(Report, CarriesTheLibraryAndItsLicence) {
   write_run();
   EXPECT_NE(page().find("Copyright (c) 2022 Leon Sorokin"), std::string::npos);
-  std::ifstream file(fs::path(CUTFORCE_SOURCE_DIR) / "firmware/host/report/uplot/uPlot.iife.min.js", std::ios::binary);
+  std::ifstream file(fs::path(CUTFORCE_SOURCE_DIR) / "firmware/host/report/uplot/uPlot.iife.min.js",
+                     std::ios::binary);
   const std::string original{std::istreambuf_iterator<char>(file), {}};
   EXPECT_EQ(assets::kPlotScript, original);
   EXPECT_NE(page().find(original), std::string::npos);
@@ -237,7 +246,8 @@ TEST_F(Report, LosesNoPeakOfALongRun) {
 
 TEST_F(Report, WorksWithNothingButATitleAndATrace) {
   write("trace.csv", trace_text(3, 0.01));
-  write("summary.json", R"({"title": "bare", "traces": [{"name": "measured", "path": "trace.csv"}]})");
+  write("summary.json",
+        R"({"title": "bare", "traces": [{"name": "measured", "path": "trace.csv"}]})");
   EXPECT_EQ(unbalanced(page()), "");
   const auto written = write_report(dir_);
   ASSERT_TRUE(written);
@@ -266,7 +276,8 @@ TEST_F(Report, SaysWhatIsWrongWithARunAndLeavesNoPage) {
       {"no traces", R"({"title": "t"})", "t_s\n1\n", "traces"},
       {"no path", R"({"title": "t", "traces": [{"name": "a"}]})", "t_s\n1\n", "traces"},
       {"wrong type", R"({"title": "t", "traces": [3]})", "t_s\n1\n", "traces"},
-      {"missing file", R"({"title": "t", "traces": [{"name": "a", "path": "b.csv"}]})", "t_s\n1\n", "b.csv"},
+      {"missing file", R"({"title": "t", "traces": [{"name": "a", "path": "b.csv"}]})", "t_s\n1\n",
+       "b.csv"},
       {"empty file", kGood, "", "trace.csv"},
       {"no time", kGood, "a,b\n1,2\n", "trace.csv:1"},
       {"text in a number", kGood, "t_s,override_pct\n1,2\n2,x\n", "trace.csv:3"},

@@ -49,10 +49,14 @@ std::array<float, 8> flat(const SampleGate::Values& v) {
 }
 
 void set(SampleGate::Values& v, std::size_t k, float x) {
-  if (k < 3) v.voltage_v[k] = x;
-  else if (k < 6) v.current_a[k - 3] = x;
-  else if (k == 6) v.speed_rad_s = x;
-  else v.power_w = x;
+  if (k < 3)
+    v.voltage_v[k] = x;
+  else if (k < 6)
+    v.current_a[k - 3] = x;
+  else if (k == 6)
+    v.speed_rad_s = x;
+  else
+    v.power_w = x;
 }
 
 // What the gate says and what it lets through.
@@ -238,10 +242,14 @@ class Vandal {
   SampleGate::Input next() {
     SampleGate::Input in = good(time_ns_, unit());
     const double dice = uniform_(random_);
-    if (dice < 0.80) time_ns_ += kMs;
-    else if (dice < 0.90) time_ns_ += static_cast<std::int64_t>(uniform_(random_) * 3e6);
-    else if (dice < 0.97) time_ns_ += static_cast<std::int64_t>(uniform_(random_) * 20e6);
-    else if (dice < 0.98) time_ns_ += static_cast<std::int64_t>(uniform_(random_) * 10e9);
+    if (dice < 0.80)
+      time_ns_ += kMs;
+    else if (dice < 0.90)
+      time_ns_ += static_cast<std::int64_t>(uniform_(random_) * 3e6);
+    else if (dice < 0.97)
+      time_ns_ += static_cast<std::int64_t>(uniform_(random_) * 20e6);
+    else if (dice < 0.98)
+      time_ns_ += static_cast<std::int64_t>(uniform_(random_) * 10e9);
     in.time_ns = time_ns_;
     in.present = static_cast<std::uint32_t>(random_() % 4);
     while (uniform_(random_) < 0.3) set(in.values, random_() % 8, rubbish());
@@ -293,8 +301,8 @@ TEST(SampleGate, NeverLetsAnythingThroughThatIsNotFiniteAndInRange) {
     dropped += out.verdict == Verdict::kDrop;
     restarted += out.verdict == Verdict::kRestart;
   }
-  std::printf("accepted %d, bridged %d, dropped %d, restarted %d: 0 bad values\n", accepted, bridged,
-              dropped, restarted);
+  std::printf("accepted %d, bridged %d, dropped %d, restarted %d: 0 bad values\n", accepted,
+              bridged, dropped, restarted);
   EXPECT_GT(std::min({accepted, bridged, dropped, restarted}), 1000);
 }
 

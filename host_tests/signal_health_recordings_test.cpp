@@ -37,8 +37,10 @@ std::filesystem::path shared_folder() {
 std::vector<std::string> split(const std::string& line) {
   std::vector<std::string> out(1);
   for (const char c : line) {
-    if (c == ',') out.emplace_back();
-    else if (c != '\n' && c != '\r') out.back() += c;
+    if (c == ',')
+      out.emplace_back();
+    else if (c != '\n' && c != '\r')
+      out.back() += c;
   }
   return out;
 }
@@ -53,14 +55,17 @@ Recording read(const std::filesystem::path& path) {
     if (text[0] == '#') {
       const auto colon = text.find(": ");
       if (colon != std::string::npos)
-        recording.metadata[text.substr(2, colon - 2)] = std::strtof(text.c_str() + colon + 2, nullptr);
+        recording.metadata[text.substr(2, colon - 2)] =
+            std::strtof(text.c_str() + colon + 2, nullptr);
     } else if (names.empty()) {
       names = split(text);
     } else {
       const auto cells = split(text);
       for (std::size_t k = 0; k < names.size(); ++k) {
-        if (names[k] == "t_s") recording.time_s.push_back(std::strtod(cells[k].c_str(), nullptr));
-        else recording.column[names[k]].push_back(std::strtof(cells[k].c_str(), nullptr));
+        if (names[k] == "t_s")
+          recording.time_s.push_back(std::strtod(cells[k].c_str(), nullptr));
+        else
+          recording.column[names[k]].push_back(std::strtof(cells[k].c_str(), nullptr));
       }
     }
   }
@@ -73,7 +78,7 @@ struct Condition {
   const char* name;
   bool line_to_line;
   bool two_currents;
-  bool sensorless;        // the frequency is followed in the current alone
+  bool sensorless;  // the frequency is followed in the current alone
   bool rating_known;
   float tick_s;
 };
@@ -108,9 +113,8 @@ SignalHealth::Config health_config(const Recording& r, const Condition& c, float
   const float current_a = r.metadata.contains("rated_current_a_rms")
                               ? r.metadata.at("rated_current_a_rms")
                               : power_w / 480.0F;
-  const float resistance_ohm = r.metadata.contains("stator_resistance_ohm")
-                                   ? r.metadata.at("stator_resistance_ohm")
-                                   : 1.2F;
+  const float resistance_ohm =
+      r.metadata.contains("stator_resistance_ohm") ? r.metadata.at("stator_resistance_ohm") : 1.2F;
   return {.sample_period_s = sample_s,
           .tick_period_s = std::max(c.tick_s, sample_s),
           .voltage_channels = 3,
@@ -121,9 +125,9 @@ SignalHealth::Config health_config(const Recording& r, const Condition& c, float
           .current_floor_a = 0.28F,
           .minimum_frequency_rad_s = 18.85F,
           .rated_frequency_rad_s = c.rating_known ? 314.0F : 0.0F,
-          .rated_flux_v_s =
-              c.rating_known ? estimator::rated_flux_from_name_plate(power_w, current_a, 50.0F)
-                             : 0.0F,
+          .rated_flux_v_s = c.rating_known
+                                ? estimator::rated_flux_from_name_plate(power_w, current_a, 50.0F)
+                                : 0.0F,
           .stator_resistance_ohm = resistance_ohm,
           .hold_s = 0.1F};
 }
@@ -134,12 +138,12 @@ Verdict run(const Recording& r, const Condition& c) {
   std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
                    steps.end());
   const double sample_s = steps[steps.size() / 2];
-  auto health =
-      SignalHealth::make(health_config(r, c, static_cast<float>(sample_s))).value();
+  auto health = SignalHealth::make(health_config(r, c, static_cast<float>(sample_s))).value();
   const auto front_end =
-      FrontEnd::make({c.line_to_line ? VoltageChannels::kLineToLine : VoltageChannels::kLineToNeutral,
-                      c.two_currents ? CurrentChannels::kTwo : CurrentChannels::kThree,
-                      {{1, 1, 1}, {0, 0, 0}, {1, 1, 1}, {0, 0, 0}}})
+      FrontEnd::make(
+          {c.line_to_line ? VoltageChannels::kLineToLine : VoltageChannels::kLineToNeutral,
+           c.two_currents ? CurrentChannels::kTwo : CurrentChannels::kThree,
+           {{1, 1, 1}, {0, 0, 0}, {1, 1, 1}, {0, 0, 0}}})
           .value();
   const auto& u = r.column.at("v_un_v");
   const auto& v = r.column.at("v_vn_v");
@@ -164,7 +168,8 @@ Verdict run(const Recording& r, const Condition& c) {
     if (std::fabs(pole_pairs * speed[n]) >= 18.85F && verdict.first_turning_s < 0.0)
       verdict.first_turning_s = r.time_s[n];
     if (r.time_s[n] + 0.5 * sample_s < tick_ends_s) continue;
-    while (tick_ends_s <= r.time_s[n] + 0.5 * sample_s) tick_ends_s += static_cast<double>(c.tick_s);
+    while (tick_ends_s <= r.time_s[n] + 0.5 * sample_s)
+      tick_ends_s += static_cast<double>(c.tick_s);
     const auto health_out = health.step({frequency, speed[n], !c.sensorless});
     if (!health_out.faults.empty() && verdict.first_fault_s < 0.0)
       verdict.first_fault_s = r.time_s[n];
@@ -178,8 +183,7 @@ Verdict run(const Recording& r, const Condition& c) {
 std::string names(FaultSet faults) {
   std::string out;
   for (std::size_t k = 0; k < estimator::kFaultCount; ++k)
-    if (faults.contains(static_cast<Fault>(k)))
-      out += std::string(estimator::kFaultNames[k]) + " ";
+    if (faults.contains(static_cast<Fault>(k))) out += std::string(estimator::kFaultNames[k]) + " ";
   return out;
 }
 
@@ -218,8 +222,8 @@ TEST_F(SharedRecordings, OfSoundSignalsShowNoFaultInAnyCondition) {
     for (const Condition& condition : kConditions) {
       const Verdict verdict = run(recording, condition);
       EXPECT_TRUE(verdict.faults.empty())
-          << path.filename() << ", " << condition.name << ": " << names(verdict.faults) << "first at "
-          << verdict.first_fault_s << " s";
+          << path.filename() << ", " << condition.name << ": " << names(verdict.faults)
+          << "first at " << verdict.first_fault_s << " s";
     }
   }
 }

@@ -52,8 +52,7 @@ constexpr double kSpeeds[] = {300.0, 600.0, 1000.0, 1500.0, 2400.0};
 std::string names(FaultSet faults) {
   std::string out;
   for (std::size_t k = 0; k < estimator::kFaultCount; ++k)
-    if (faults.contains(static_cast<Fault>(k)))
-      out += std::string(estimator::kFaultNames[k]) + " ";
+    if (faults.contains(static_cast<Fault>(k))) out += std::string(estimator::kFaultNames[k]) + " ";
   return out;
 }
 
@@ -126,7 +125,8 @@ class Rig {
   SignalHealth& block() { return health_; }
 
  private:
-  FrontEnd front_end_ = FrontEnd::make({VoltageChannels::kLineToNeutral, CurrentChannels::kThree,
+  FrontEnd front_end_ = FrontEnd::make({VoltageChannels::kLineToNeutral,
+                                        CurrentChannels::kThree,
                                         {{1, 1, 1}, {0, 0, 0}, {1, 1, 1}, {0, 0, 0}}})
                             .value();
   SignalHealth health_ = SignalHealth::make(kHealth).value();
@@ -318,8 +318,8 @@ TEST(SignalHealth, RefusesRawPwmWithinThreeTenthsOfASecondHoweverItIsSampled) {
           ++runs;
           refused += ms > 0 && ms <= 300;
           slowest = std::max(slowest, ms > 0 ? ms : 9999);
-          EXPECT_TRUE(ms > 0 && ms <= 300)
-              << rate << " Hz, " << rpm << " rpm, noise " << noise << ", phase " << phase << ": " << ms;
+          EXPECT_TRUE(ms > 0 && ms <= 300) << rate << " Hz, " << rpm << " rpm, noise " << noise
+                                           << ", phase " << phase << ": " << ms;
         }
       }
     }
@@ -359,8 +359,9 @@ TEST(SignalHealth, FindsNothingInSoundSignalsOfAnyKind) {
             seen = seen | rig.run(0.5);
             rig.motor.condition.load = -0.3;  // braking
             seen = seen | rig.run(0.5);
-            EXPECT_TRUE(seen.empty()) << rate << " Hz " << rpm << " rpm noise " << noise << " run-up "
-                                      << run_up_s << " x " << scale << ": " << names(seen);
+            EXPECT_TRUE(seen.empty())
+                << rate << " Hz " << rpm << " rpm noise " << noise << " run-up " << run_up_s
+                << " x " << scale << ": " << names(seen);
             ++runs;
             sound += seen.empty();
             seconds += 1.5;
@@ -461,7 +462,8 @@ TEST(SignalHealth, RefusesWhatCannotBeARange) {
 // finite, or the block would be blind from then on.
 TEST(SignalHealth, StaysFiniteUnderAnythingThatTheGateLetsThrough) {
   std::mt19937 random(11);
-  const auto front_end = FrontEnd::make({VoltageChannels::kLineToNeutral, CurrentChannels::kThree,
+  const auto front_end = FrontEnd::make({VoltageChannels::kLineToNeutral,
+                                         CurrentChannels::kThree,
                                          {{1, 1, 1}, {0, 0, 0}, {1, 1, 1}, {0, 0, 0}}})
                              .value();
   auto health = SignalHealth::make(kHealth).value();
@@ -477,7 +479,8 @@ TEST(SignalHealth, StaysFiniteUnderAnythingThatTheGateLetsThrough) {
       health.observe({v, i, out.motor, out.current_residual_a, any(100.0F),
                       static_cast<std::uint32_t>(random() % 64)});
     }
-    (void)health.step({std::bit_cast<float>(static_cast<std::uint32_t>(random())), any(1e6F), true});
+    (void)health.step(
+        {std::bit_cast<float>(static_cast<std::uint32_t>(random())), any(1e6F), true});
     const auto& s = health.state();
     for (const float x : s.phasors.cosine_sum) ASSERT_TRUE(std::isfinite(x)) << n;
     for (const float x : s.amplitude) ASSERT_TRUE(std::isfinite(x)) << n;
@@ -490,7 +493,8 @@ TEST(SignalHealth, StaysFiniteUnderAnythingThatTheGateLetsThrough) {
 TEST(SignalHealth, ContinuesBitExactlyFromASnapshotWithoutAllocating) {
   Rig rig({.load = 0.5});
   (void)rig.run(0.3);
-  const auto front_end = FrontEnd::make({VoltageChannels::kLineToNeutral, CurrentChannels::kThree,
+  const auto front_end = FrontEnd::make({VoltageChannels::kLineToNeutral,
+                                         CurrentChannels::kThree,
                                          {{1, 1, 1}, {0, 0, 0}, {1, 1, 1}, {0, 0, 0}}})
                              .value();
   auto original = rig.block();
@@ -513,7 +517,8 @@ TEST(SignalHealth, ContinuesBitExactlyFromASnapshotWithoutAllocating) {
     const auto a = original.step({314.0F, 157.0F, true});
     const auto b = resumed.step({314.0F, 157.0F, true});
     ASSERT_EQ(std::memcmp(&a, &b, sizeof a), 0) << n;
-    ASSERT_EQ(std::memcmp(&original.state(), &resumed.state(), sizeof(SignalHealth::State)), 0) << n;
+    ASSERT_EQ(std::memcmp(&original.state(), &resumed.state(), sizeof(SignalHealth::State)), 0)
+        << n;
   }
 #ifdef CUTFORCE_COUNTS_ALLOCATIONS
   EXPECT_EQ(host_tests::allocation_count(), allocations);

@@ -95,8 +95,8 @@ TEST(SimulatedMachine, GivesTheSameSignalsWhateverItsIntegrationStep) {
   double torque_nm = 0.0;
   double current_a = 0.0;
   for (std::size_t k = 0; k < coarse.size(); ++k) {
-    torque_nm = std::max(torque_nm, std::abs(coarse[k].truth.airgap_torque_nm -
-                                             fine[k].truth.airgap_torque_nm));
+    torque_nm = std::max(
+        torque_nm, std::abs(coarse[k].truth.airgap_torque_nm - fine[k].truth.airgap_torque_nm));
     current_a = std::max(current_a, magnitude(host_tests::current_of(coarse[k].sample) -
                                               host_tests::current_of(fine[k].sample)));
   }
@@ -170,8 +170,7 @@ TEST(Drive, RunsEveryPresetAtThreeHundredAndTwentyFourHundredTurns) {
       const double speed = rpm * kTwoPi / 60.0;
       config.drive.speed_reference_rad_s = Profile{{0.0, 0.0}, {0.3, 0.0}, {2.3, speed}};
       config.process.specific_force_n_m2 = 0.0;
-      config.load.torque_nm =
-          ramped_steps(0.0, {{3.2, 0.4 * preset.motor.rated_torque_nm}}, 0.03);
+      config.load.torque_nm = ramped_steps(0.0, {{3.2, 0.4 * preset.motor.rated_torque_nm}}, 0.03);
       const auto rows = run_open_loop(config, 5.0);
       EXPECT_NEAR(rows.back().truth.speed_rad_s, speed, 0.02);
       EXPECT_NEAR(rows.back().truth.airgap_torque_nm, rows.back().truth.load_torque_nm, 0.02);
@@ -310,16 +309,22 @@ TEST(FeedServo, StopsAtTheEndOfThePath) {
   EXPECT_NEAR(servo.state().position_m, 0.002, 1e-5 + 1e-9);
 }
 
-constexpr ProcessInput kSteadyCut{.time_s = 0.0, .position_m = 0.010, .feed_m_s = 0.2e-3 * 20.0,
-                                  .spindle_turns_s = 20.0, .spindle_turns = 0.0,
+constexpr ProcessInput kSteadyCut{.time_s = 0.0,
+                                  .position_m = 0.010,
+                                  .feed_m_s = 0.2e-3 * 20.0,
+                                  .spindle_turns_s = 20.0,
+                                  .spindle_turns = 0.0,
                                   .motor_speed_rad_s = 125.0};
 
 CuttingProcess process_with(const ProcessConfig& config, double gear = 1.0) {
   return CuttingProcess{config, {}, {}, gear, 1e-3};
 }
 ProcessConfig plain_process() {
-  return {.specific_force_n_m2 = 2e9, .nominal_feed_m_rev = 0.2e-3, .lag_s = 0.1,
-          .depth_m = Profile{1e-3}, .diameter_m = Profile{0.05}};
+  return {.specific_force_n_m2 = 2e9,
+          .nominal_feed_m_rev = 0.2e-3,
+          .lag_s = 0.1,
+          .depth_m = Profile{1e-3},
+          .diameter_m = Profile{0.05}};
 }
 
 TEST(CuttingProcess, AnswersAStepOfDepthAsAFirstOrderLag) {
@@ -373,9 +378,9 @@ TEST(CuttingProcess, InterruptsTheCutForTheShareOfATurnThatIsMissing) {
 }
 
 TEST(CuttingProcess, AddsTheFrictionOfTheLoadAndOscillates) {
-  CuttingProcess process({}, {.torque_nm = Profile{10.0}, .oscillations = {{1.0, 2.0, 2.0, 15.0}}},
-                         {.ratio = Profile{{0.0, 0.05}, {250.0, 0.07}},
-                          .per_nm_1_nm = Profile{0.0015}}, 1.0, 1e-3);
+  CuttingProcess process(
+      {}, {.torque_nm = Profile{10.0}, .oscillations = {{1.0, 2.0, 2.0, 15.0}}},
+      {.ratio = Profile{{0.0, 0.05}, {250.0, 0.07}}, .per_nm_1_nm = Profile{0.0015}}, 1.0, 1e-3);
   ProcessInput input = kSteadyCut;
   process.step(input);
   EXPECT_NEAR(process.state().load_torque_nm, 10.0 + 0.06 * 10.0 + 0.0015 * 100.0, 1e-12);

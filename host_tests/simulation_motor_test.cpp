@@ -36,7 +36,8 @@ TEST(Arithmetic, AgreesWithTheLibraryToTheLastBits) {
     ASSERT_NEAR(sine_cosine(x).cosine, std::cos(x), 2e-16 + 1e-16 * std::abs(x)) << x;
     ASSERT_NEAR(exponential(y) / std::exp(y), 1.0, 5e-16) << y;
     ASSERT_NEAR(logarithm(std::abs(x)), std::log(std::abs(x)),
-                5e-16 * (1.0 + std::abs(std::log(std::abs(x))))) << x;
+                5e-16 * (1.0 + std::abs(std::log(std::abs(x)))))
+        << x;
     ASSERT_NEAR(power(std::abs(y), 0.864), std::pow(std::abs(y), 0.864), 1e-13) << y;
     ASSERT_NEAR(hyperbolic_tangent(0.1 * y), std::tanh(0.1 * y), 4e-16) << y;
   }
@@ -119,8 +120,8 @@ TEST(InductionMotor, HasTheTorqueOfTheEquivalentCircuitAtEverySlip) {
         const double volt = 1.04 * supply;
         const auto settled = settle(motor, volt, supply, (1.0 - slip) * supply / 2.0);
         double flux_vs = 0.0;
-        const double torque = circuit_torque_nm(motor, motor.stator_inductance_h, volt, supply,
-                                                slip, &flux_vs);
+        const double torque =
+            circuit_torque_nm(motor, motor.stator_inductance_h, volt, supply, slip, &flux_vs);
         // What is left is the ripple of a voltage held for 20 us.
         EXPECT_NEAR(settled.at.torque_nm, torque, 2e-4 * std::abs(torque));
         EXPECT_NEAR(magnitude(settled.flux.stator_vs), flux_vs, 1e-4 * flux_vs);
@@ -138,9 +139,8 @@ TEST(InductionMotor, SaturatesConsistentlyWithItsOwnFlux) {
     const double stator_h = 0.34 / (1.0 + std::pow(0.84 * flux, 7.0));
     EXPECT_NEAR(InductionMotor{motor}.stator_inductance_h(flux), stator_h, 1e-12);
     double flux_of_circuit = 0.0;
-    const double torque =
-        circuit_torque_nm(motor, stator_h, volt, 314.159, 1.0 - 0.97 * 157.08 * 2.0 / 314.159,
-                          &flux_of_circuit);
+    const double torque = circuit_torque_nm(motor, stator_h, volt, 314.159,
+                                            1.0 - 0.97 * 157.08 * 2.0 / 314.159, &flux_of_circuit);
     EXPECT_NEAR(settled.at.torque_nm, torque, 2e-4 * torque);
     EXPECT_NEAR(flux, flux_of_circuit, 1e-4 * flux);
   }
@@ -166,8 +166,8 @@ TEST(InductionMotor, GammaAndInverseGammaAreOneMotor) {
 TEST(InductionMotor, AccountsForEveryJouleOfItsInput) {
   MotorConfig motor = motor_a().motor;
   motor.iron_conductance_s = 1.5e-3;
-  const SpindleConfig spindle{.inertia_kg_m2 = 0.03, .coulomb_torque_nm = 0.4,
-                              .viscous_nm_s_rad = 0.002};
+  const SpindleConfig spindle{
+      .inertia_kg_m2 = 0.03, .coulomb_torque_nm = 0.4, .viscous_nm_s_rad = 0.002};
   const Plant plant(motor, spindle, 0.0);
   PlantState state{};
   PlantInput input{.voltage_v = {}, .cut_load_nm = 3.0, .friction_ratio = 1.0};

@@ -21,9 +21,9 @@ struct Means {
   double load_nm = 0.0;
   double cutting_nm = 0.0;
   double speed_rad_s = 0.0;
-  double current_a = 0.0;   // amplitude
+  double current_a = 0.0;  // amplitude
   double voltage_v = 0.0;
-  double power_w = 0.0;     // v i
+  double power_w = 0.0;  // v i
   double meter_w = 0.0;
   double slip_rad_s = 0.0;  // electrical, from the angle of the current
   int count = 0;
@@ -36,15 +36,24 @@ struct Instant {
 
 Instant instant_of(const Columns& c, std::size_t k) {
   const auto at = [&](const char* name) { return c.find(name)->second[k]; };
-  return {at("t_s"), at("true_airgap_torque_nm"), at("true_load_torque_nm"),
-          at("true_cutting_torque_nm"), at("speed_rad_s"), at("power_meter_w"),
+  return {at("t_s"),
+          at("true_airgap_torque_nm"),
+          at("true_load_torque_nm"),
+          at("true_cutting_torque_nm"),
+          at("speed_rad_s"),
+          at("power_meter_w"),
           from_phases({at("v_un_v"), at("v_vn_v"), at("v_wn_v")}),
           from_phases({at("i_u_a"), at("i_v_a"), at("i_w_a")})};
 }
 Instant instant_of(const Row& r) {
-  return {r.time_s(), r.truth.airgap_torque_nm, r.truth.load_torque_nm, r.truth.cutting_torque_nm,
-          r.truth.speed_rad_s, static_cast<double>(r.sample.power_meter_w),
-          host_tests::voltage_of(r.sample), host_tests::current_of(r.sample)};
+  return {r.time_s(),
+          r.truth.airgap_torque_nm,
+          r.truth.load_torque_nm,
+          r.truth.cutting_torque_nm,
+          r.truth.speed_rad_s,
+          static_cast<double>(r.sample.power_meter_w),
+          host_tests::voltage_of(r.sample),
+          host_tests::current_of(r.sample)};
 }
 
 template <class At>
@@ -65,8 +74,10 @@ Means means_of(std::size_t size, double begin_s, double end_s, At at) {
     m.voltage_v += magnitude(now.v);
     m.power_w += 1.5 * dot(now.v, now.i);
     m.meter_w += now.meter;
-    if (m.count++ == 0) first_s = now.t;
-    else angle += std::atan2(cross(before, now.i), dot(before, now.i));
+    if (m.count++ == 0)
+      first_s = now.t;
+    else
+      angle += std::atan2(cross(before, now.i), dot(before, now.i));
     before = now.i;
     last_s = now.t;
   }
@@ -87,8 +98,11 @@ struct Tolerance {
 };
 
 // Tolerances of one percent and less: the drives' observers differ, the motor may not.
-constexpr Tolerance kAveraged{.torque_nm = 0.01, .current_ratio = 0.003, .voltage_ratio = 0.001,
-                              .power_ratio = 0.005, .slip_rad_s = 0.03};
+constexpr Tolerance kAveraged{.torque_nm = 0.01,
+                              .current_ratio = 0.003,
+                              .voltage_ratio = 0.001,
+                              .power_ratio = 0.005,
+                              .slip_rad_s = 0.03};
 
 void compare(const std::string& name, const SimulatedMachineConfig& config,
              const std::vector<double>& window_begin_s, const Tolerance& tolerance) {
@@ -122,8 +136,8 @@ SimulatedMachineConfig entry_step_exit() {
 }
 
 TEST(SharedRecording, EntryStepAndExitAreReproducedAtEveryRate) {
-  for (const auto& [name, rate_hz] : {std::pair{"c01_avg_1k", 1e3}, {"c01_avg_5k", 5e3},
-                                      {"c01_avg_20k", 2e4}}) {
+  for (const auto& [name, rate_hz] :
+       {std::pair{"c01_avg_1k", 1e3}, {"c01_avg_5k", 5e3}, {"c01_avg_20k", 2e4}}) {
     SimulatedMachineConfig config = entry_step_exit();
     config.sample_rate_hz = rate_hz;
     compare(name, config, {1.7, 2.8, 3.8, 4.45}, kAveraged);
@@ -133,8 +147,10 @@ TEST(SharedRecording, EntryStepAndExitAreReproducedAtEveryRate) {
 
 TEST(SharedRecording, LoadStepsToOnePointTwoOfRatedAreReproduced) {
   SimulatedMachineConfig config = motor_a();
-  config.load.torque_nm = ramped_steps(0.0, {{1.4, 1.46}, {2.0, 3.65}, {2.6, 7.3}, {3.2, 10.95},
-                                             {3.8, 14.6}, {4.4, 17.52}, {5.0, 0.0}}, 0.02);
+  config.load.torque_nm = ramped_steps(
+      0.0,
+      {{1.4, 1.46}, {2.0, 3.65}, {2.6, 7.3}, {3.2, 10.95}, {3.8, 14.6}, {4.4, 17.52}, {5.0, 0.0}},
+      0.02);
   compare("c03_avg_5k", config, {1.3, 1.9, 2.5, 3.1, 3.7, 4.3, 4.9}, kAveraged);
 }
 

@@ -147,14 +147,18 @@ TEST(SignalFaults, HarmOnlyTheirChannelAndOnlyInTheirTime) {
       const double t = clean[k].time_s();
       const bool inside = t >= 0.1 && t < 0.2;
       ASSERT_EQ(harmed[k].sample.current_a[0],
-                inside ? expected(clean[k].sample) : clean[k].sample.current_a[0]) << t;
+                inside ? expected(clean[k].sample) : clean[k].sample.current_a[0])
+          << t;
       ASSERT_EQ(harmed[k].sample.voltage_v, clean[k].sample.voltage_v);
       ASSERT_EQ(harmed[k].truth.airgap_torque_nm, clean[k].truth.airgap_torque_nm);
     }
   };
   const float last = clean[499].sample.current_a[0];
-  SignalFault fault{.kind = SignalFaultKind::kStuck, .begin_s = 0.1, .end_s = 0.2,
-                    .channel = Signal::kCurrentU, .other = Signal::kCurrentV};
+  SignalFault fault{.kind = SignalFaultKind::kStuck,
+                    .begin_s = 0.1,
+                    .end_s = 0.2,
+                    .channel = Signal::kCurrentU,
+                    .other = Signal::kCurrentV};
   check(fault, [&](const Sample&) { return last; });
   fault.kind = SignalFaultKind::kLost;
   check(fault, [](const Sample&) { return 0.0F; });
@@ -205,15 +209,23 @@ TEST(SimulatedMachineConfig, RefusesWhatCannotBeAndNamesTheKey) {
       Case{"drive.current_bandwidth_rad_s", [](auto& c) { c.drive.current_bandwidth_rad_s = 1e5; }},
       Case{"drive.speed_reference_rad_s", [](auto& c) { c.drive.speed_reference_rad_s = {}; }},
       Case{"drive.speed_reference_rad_s",
-           [](auto& c) { c.drive.speed_reference_rad_s = Profile{{1.0, 0.0}, {0.5, 10.0}}; }},
+           [](auto& c) {
+             c.drive.speed_reference_rad_s = Profile{{1.0, 0.0}, {0.5, 10.0}};
+           }},
       Case{"spindle.inertia_kg_m2", [](auto& c) { c.spindle.inertia_kg_m2 = -0.1; }},
       Case{"spindle.gear_ratio", [](auto& c) { c.spindle.gear_ratio = 0.0; }},
       Case{"process.depth_m", [](auto& c) { c.process.depth_m = Profile{-1e-3}; }},
       Case{"process.diameter_m", [](auto& c) { c.process.diameter_m = Profile{0.0}; }},
-      Case{"process.hard_spots", [](auto& c) { c.process.hard_spots = {{0.2, 0.1, 2.0}}; }},
+      Case{"process.hard_spots",
+           [](auto& c) {
+             c.process.hard_spots = {{0.2, 0.1, 2.0}};
+           }},
       Case{"feed.feed_m_s", [](auto& c) { c.feed.feed_m_s = 1e-3; }},
       Case{"feed.initial_override_pct", [](auto& c) { c.feed.initial_override_pct = 255.0; }},
-      Case{"load.oscillations", [](auto& c) { c.load.oscillations = {{2.0, 1.0, 1.0, 15.0}}; }},
+      Case{"load.oscillations",
+           [](auto& c) {
+             c.load.oscillations = {{2.0, 1.0, 1.0, 15.0}};
+           }},
       Case{"sensors.voltage[1]", [](auto& c) { c.sensors.voltage[1].bits = 12.0; }},
       Case{"sensors.current[0]", [](auto& c) { c.sensors.current[0].noise = -1.0; }},
       Case{"sensors.voltage_lead_s", [](auto& c) { c.sensors.voltage_lead_s = 1e-3; }},

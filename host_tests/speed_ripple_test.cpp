@@ -45,8 +45,8 @@ Run learn_then_cut(Eccentric shaft, double idle_s, SpeedRipple& ripple) {
   const int idle = static_cast<int>(idle_s / kTick);
   for (int k = 0; k < idle + 1000; ++k) {
     const double noisy = shaft.tick();
-    const double truth = shaft.once * std::cos(shaft.angle - 0.8) +
-                         shaft.twice * std::sin(2.0 * shaft.angle + 0.3);
+    const double truth =
+        shaft.once * std::cos(shaft.angle - 0.8) + shaft.twice * std::sin(2.0 * shaft.angle + 0.3);
     const auto error = static_cast<double>(
         ripple.step(static_cast<float>(shaft.speed + noisy), static_cast<float>(kTick)));
     if (k < idle) {
@@ -62,8 +62,8 @@ Run learn_then_cut(Eccentric shaft, double idle_s, SpeedRipple& ripple) {
 TEST(SpeedRipple, LearnsAnEccentricityInIdleAndTakesItOffInTheCut) {
   for (const double speed : {31.0, 157.0, -157.0}) {
     SpeedRipple ripple;
-    const auto run = learn_then_cut(
-        {.speed = speed, .once = 0.35, .twice = 0.1, .noise = 0.02}, 2.5, ripple);
+    const auto run =
+        learn_then_cut({.speed = speed, .once = 0.35, .twice = 0.1, .noise = 0.02}, 2.5, ripple);
     EXPECT_TRUE(ripple.applies()) << speed;
     EXPECT_LT(run.remaining, 0.1 * run.raw) << speed;
   }

@@ -15,7 +15,7 @@ namespace {
 
 using estimator::StatorResistance;
 
-constexpr double kUsed = 3.7;        // the resistance in use
+constexpr double kUsed = 3.7;  // the resistance in use
 constexpr double kRotor = 2.1;
 constexpr double kPolePairs = 2.0;
 constexpr double kRatedTorque = 14.6;
@@ -37,11 +37,11 @@ static_assert(kUnknownIron.check());
 
 // The steady state of a T model with iron loss, seen through a wrong stator resistance.
 struct Motor {
-  double change = 0.0;          // true resistance less that in use, as a part of it
-  double rotor = 1.0;           // true rotor resistance over the configured
-  double frequency = 62.8;      // electrical
-  double iron_nm = 0.0;         // at rated frequency
-  double slip_noise = 0.0;      // of one tick
+  double change = 0.0;      // true resistance less that in use, as a part of it
+  double rotor = 1.0;       // true rotor resistance over the configured
+  double frequency = 62.8;  // electrical
+  double iron_nm = 0.0;     // at rated frequency
+  double slip_noise = 0.0;  // of one tick
   double flux = 0.95;
   std::mt19937 random{61};
 
@@ -60,8 +60,8 @@ struct Motor {
             .frequency_rad_s = static_cast<float>(frequency),
             .torque_nm = static_cast<float>(torque + change * kUsed * x + iron),
             .current_squared_a2 = static_cast<float>(squared),
-            .idle_copper_nm_ohm = static_cast<float>(
-                1.5 * flux_current * flux_current * kPolePairs / frequency),
+            .idle_copper_nm_ohm =
+                static_cast<float>(1.5 * flux_current * flux_current * kPolePairs / frequency),
             .duration_s = 1e-3F,
             .steady = true};
   }
