@@ -368,7 +368,7 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .valid = tick_.locked_s > kLock_s + kInertiaWait_s,
                  .idle = idle && air.idle_s > kAveragedTare_s,
                  .in_cut = air.phase == AirCut::Phase::kCut,
-                 .tare_nm = air.tare_nm});
+                 .tare_nm = load.speed_rad_s < 0.0F ? -air.tare_nm : air.tare_nm});
 
   out.valid = true;
   if (air.steady) {

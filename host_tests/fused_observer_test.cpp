@@ -210,10 +210,14 @@ TEST(FusedObserver, WorksWithoutASpeedSensor) {
   EXPECT_LE(result.metrics.t50_ms.value(), 8.0);
 }
 
+// With what has to be learned on the way: inertia, friction, resistance.
 TEST(FusedObserver, IsTheSameForASpindleThatTurnsBackward) {
   auto machine = stepped(hal::host::motor_a(), 1000.0);
   const auto rows = run_open_loop(machine, 4.0);
-  auto forward = FusedObserver::make(config_of(machine)).value();
+  auto config = config_of(machine);
+  config.air.coulomb_torque_nm = config.inertia.coulomb_torque_nm = 0.0F;
+  config.inertia.inertia_kg_m2 *= 1.1F;
+  auto forward = FusedObserver::make(config).value();
   auto backward = forward;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     auto sample = sample_of(rows[k].sample, k == 0);
@@ -232,6 +236,8 @@ TEST(FusedObserver, IsTheSameForASpindleThatTurnsBackward) {
     ASSERT_NEAR(a.net_sigma_nm, b.net_sigma_nm, 0.01) << k;
     ASSERT_NEAR(a.airgap_power_w, b.airgap_power_w, 0.1) << k;
   }
+  EXPECT_NEAR(forward.state().inertia.inertia_kg_m2, machine.spindle.inertia_kg_m2, 6e-4);
+  EXPECT_NEAR(forward.state().inertia.inertia_kg_m2, backward.state().inertia.inertia_kg_m2, 1e-5);
 }
 
 TEST(FusedObserver, ClaimsNothingAtStandstillOrWithoutSamples) {
