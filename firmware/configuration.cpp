@@ -299,7 +299,7 @@ control::ControlPath::Config controller(const Machine& m, float period_s) noexce
                         .on_ratio = on_ratio,
                         .off_ratio = 0.77F * on_ratio,
                         .entry_s = 0.15F,
-                        .lost_s = 0.5F,
+                        .lost_s = period_s > 0.5F ? period_s : 0.5F,
                         .drop_ratio = 0.1F},
           .law = {.period_s = period_s,
                   .form = control::PiController::Form::kVelocity,
