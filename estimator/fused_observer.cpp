@@ -218,7 +218,8 @@ auto FusedObserver::unlocked(float speed_rad_s, AirCut::Feed feed, Output out) n
                  .valid = false,
                  .idle = false,
                  .in_cut = false,
-                 .tare_nm = 0.0F});
+                 .tare_nm = 0.0F,
+                 .calibrated = false});
   out.valid = false;
   out.phase = AirCut::Phase::kUnsteady;
   out.speed_rad_s = speed_rad_s;
@@ -368,7 +369,8 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .valid = tick_.locked_s > kLock_s + kInertiaWait_s,
                  .idle = idle && air.idle_s > kAveragedTare_s,
                  .in_cut = air.phase == AirCut::Phase::kCut,
-                 .tare_nm = load.speed_rad_s < 0.0F ? -air.tare_nm : air.tare_nm});
+                 .tare_nm = load.speed_rad_s < 0.0F ? -air.tare_nm : air.tare_nm,
+                 .calibrated = tick_.calibrated != 0});
 
   out.valid = true;
   if (air.steady) {

@@ -6,6 +6,7 @@ namespace cutforce::estimator {
 namespace {
 
 constexpr float kTorqueError_ratio = 0.01F;  // of the run-up's torque: resistance, offsets
+constexpr float kOffsetError_ratio = 0.03F;  // at rated speed, of offsets that nobody took out
 constexpr float kTareError_ratio = 0.002F;   // of rated: friction differs while speeding up
 constexpr float kWorthwhile_ratio = 0.05F;   // of the given variance: an episode below counts
 constexpr float kLeastSigma_ratio = 0.005F;  // the torque's own errors repeat
@@ -24,7 +25,8 @@ auto RunUpInertia::make(const Config& config) noexcept -> std::expected<RunUpIne
 }
 
 void RunUpInertia::forget_episode() noexcept {
-  state_.impulse_nm_s = state_.gained_rad_s = state_.time_s = 0.0F;
+  state_.impulse_nm_s = state_.gained_rad_s = state_.time_s = state_.turned_rad = 0.0F;
+  state_.calibrated = 1;
 }
 
 void RunUpInertia::step(const Input& in) noexcept {
@@ -44,6 +46,8 @@ void RunUpInertia::step(const Input& in) noexcept {
     s.impulse_nm_s += (in.torque_nm - friction) * in.duration_s;
     s.gained_rad_s += in.speed_rad_s - s.last_speed_rad_s;
     s.time_s += in.duration_s;
+    s.turned_rad += in.speed_rad_s * sign * in.duration_s;
+    if (!in.calibrated) s.calibrated = 0;
   }
   s.seen = 1;
   s.last_speed_rad_s = in.speed_rad_s;
@@ -55,7 +59,11 @@ void RunUpInertia::close(float tare_nm) noexcept {
   if (!(gained > 0.0F && s.time_s > 0.0F)) return;
   const float seen = (s.impulse_nm_s - tare_nm * s.time_s) / s.gained_rad_s;  // (E115)
   const float from_tare = kTareError_ratio * config_.rated_torque_nm * s.time_s / gained;
-  const float from_torque = kTorqueError_ratio * seen;
+  float torque_error = kTorqueError_ratio;
+  if (s.calibrated == 0 && s.turned_rad > 0.0F) {
+    torque_error += kOffsetError_ratio * config_.rated_speed_rad_s * s.time_s / s.turned_rad;
+  }
+  const float from_torque = torque_error * seen;
   const float given_sigma = config_.inertia_sigma_ratio * config_.inertia_kg_m2;
   const float off_given = seen - config_.inertia_kg_m2;
   const float farthest = kFarthest_sigmas * given_sigma;

@@ -24,9 +24,11 @@ class RunUpInertia {
     float coulomb_torque_nm;
     float viscous_nm_s_rad;
     float rated_torque_nm;
+    float rated_speed_rad_s;  // about: below it channel offsets weigh the more
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
-      if (!(inertia_kg_m2 > 0.0F && inertia_sigma_ratio >= 0.0F && rated_torque_nm > 0.0F))
+      if (!(inertia_kg_m2 > 0.0F && inertia_sigma_ratio >= 0.0F && rated_torque_nm > 0.0F &&
+            rated_speed_rad_s > 0.0F))
         return std::unexpected{ConfigError::kInertia};
       if (!(coulomb_torque_nm >= 0.0F && viscous_nm_s_rad >= 0.0F))
         return std::unexpected{ConfigError::kFriction};
@@ -42,12 +44,15 @@ class RunUpInertia {
     bool idle;    // in the air, with a tare that has been averaged: an episode ends here
     bool in_cut;  // an episode that holds a cut is worth nothing
     float tare_nm;
+    bool calibrated;  // channel offsets are known
   };
 
   struct State {
     float impulse_nm_s = 0.0F;  // of the torque less nominal friction
     float gained_rad_s = 0.0F;
     float time_s = 0.0F;
+    float turned_rad = 0.0F;       // in this episode
+    std::uint32_t calibrated = 0;  // all through it
     float last_speed_rad_s = 0.0F;
     float inertia_kg_m2 = 0.0F;
     float sigma_ratio = 0.0F;

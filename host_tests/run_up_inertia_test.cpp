@@ -19,7 +19,8 @@ constexpr RunUpInertia::Config kSpindle{.inertia_kg_m2 = 0.03F,
                                         .inertia_sigma_ratio = 0.15F,
                                         .coulomb_torque_nm = 0.4F,
                                         .viscous_nm_s_rad = 0.002F,
-                                        .rated_torque_nm = 14.6F};
+                                        .rated_torque_nm = 14.6F,
+                                        .rated_speed_rad_s = 150.0F};
 static_assert(kSpindle.check());
 
 struct RunUp {
@@ -48,7 +49,8 @@ RunUpInertia after(const RunUp& run, const RunUpInertia::Config& config = kSpind
                 .valid = std::abs(k * 1e-3 - run.gap_s) > 5e-4,
                 .idle = false,
                 .in_cut = false,
-                .tare_nm = 0.0F});
+                .tare_nm = 0.0F,
+                .calibrated = true});
   }
   block.step({.torque_nm = 0.0F,
               .speed_rad_s = static_cast<float>(run.sign * speed),
@@ -56,7 +58,8 @@ RunUpInertia after(const RunUp& run, const RunUpInertia::Config& config = kSpind
               .valid = true,
               .idle = true,
               .in_cut = false,
-              .tare_nm = static_cast<float>(run.sign * run.extra_friction)});
+              .tare_nm = static_cast<float>(run.sign * run.extra_friction),
+              .calibrated = true});
   return block;
 }
 
@@ -107,7 +110,8 @@ TEST(RunUpInertia, LearnsFromEveryChangeOfSpeedButNotFromOneWithACut) {
                   .valid = true,
                   .idle = idle,
                   .in_cut = in_cut,
-                  .tare_nm = 0.0F});
+                  .tare_nm = 0.0F,
+                  .calibrated = true});
     };
     for (int k = 0; k < 100; ++k) tick(0.0F, true, false);
     EXPECT_EQ(block.inertia_kg_m2(), kSpindle.inertia_kg_m2);
@@ -133,6 +137,7 @@ TEST(RunUpInertia, RefusesWhatItCannotWorkWith) {
   EXPECT_EQ(refused([](auto& c) { c.inertia_kg_m2 = 0.0F; }), Error::kInertia);
   EXPECT_EQ(refused([](auto& c) { c.inertia_sigma_ratio = NAN; }), Error::kInertia);
   EXPECT_EQ(refused([](auto& c) { c.rated_torque_nm = -1.0F; }), Error::kInertia);
+  EXPECT_EQ(refused([](auto& c) { c.rated_speed_rad_s = 0.0F; }), Error::kInertia);
   EXPECT_EQ(refused([](auto& c) { c.coulomb_torque_nm = -1.0F; }), Error::kFriction);
   EXPECT_EQ(refused([](auto& c) { c.viscous_nm_s_rad = NAN; }), Error::kFriction);
   EXPECT_EQ(refused([](auto&) {}), std::nullopt);
@@ -150,7 +155,8 @@ TEST(RunUpInertia, StaysWithinTwoPriorSigmasWhateverItIsGiven) {
                   .valid = draw(random) < 0.95F,
                   .idle = k == 99,
                   .in_cut = false,
-                  .tare_nm = draw(random)});
+                  .tare_nm = draw(random),
+                  .calibrated = true});
     }
     ASSERT_TRUE(block.inertia_kg_m2() > 0.0209F && block.inertia_kg_m2() < 0.0391F) << run;
     ASSERT_TRUE(block.sigma_ratio() > 0.0F && block.sigma_ratio() <= 0.15F) << run;
@@ -169,7 +175,8 @@ TEST(RunUpInertia, ContinuesBitExactlyFromASnapshotWithoutAllocating) {
                                     .valid = k != 50,
                                     .idle = k == 599,
                                     .in_cut = false,
-                                    .tare_nm = 0.1F};
+                                    .tare_nm = 0.1F,
+                                    .calibrated = true};
     original.step(input);
     resumed.step(input);
     ASSERT_TRUE(same_bits(original.state(), resumed.state())) << k;

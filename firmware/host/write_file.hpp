@@ -9,8 +9,8 @@
 
 namespace cutforce::firmware::host {
 
-// hal::host::OutputFile in one call: writes a file of a temporary name beside `path`, then renames it. An existing file is replaced,
-// or on failure left as it was; nothing half-written stays.
+// hal::host::OutputFile in one call: writes a file of a temporary name beside `path`, then renames
+// it. An existing file is replaced, or on failure left as it was; nothing half-written stays.
 [[nodiscard]] std::expected<void, hal::host::InputError> write_file(
     const std::filesystem::path& path, std::string_view text);
 
