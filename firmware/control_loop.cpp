@@ -14,6 +14,9 @@ using hal::Signal;
 constexpr float kProof_s = 0.3F;
 constexpr float kTurning_rad_s = 18.8F;  // electrical, 3 Hz
 constexpr float kCalibrationMemory_s = 3.0F;
+constexpr float kSlipMost_ratio = 0.5F;  // of the shaft's speed, in a run-up at full torque
+constexpr float kForceMost_n = 1e9F;     // beyond any dynamometer; a sum of them stays finite
+constexpr float kDiameterMost_m = 1e3F;
 constexpr float kDoubtful_ratio = 10.0F;  // sigma with a fault that the estimate may survive
 
 bool impossible(estimator::FaultSet faults) noexcept { return faults.contains(Fault::kRawPwm); }
@@ -98,13 +101,17 @@ void ControlLoop::restart() noexcept {
 void ControlLoop::note_commands(const hal::Sample& sample) noexcept {
   if (sample.has(Signal::kFeedActive)) {
     // An active feed may still be the approach: contact is told from the torque then.
-    own_.feed = sample.feed_active > 0.5F ? 0U : 1U;
+    own_.feed = sample.feed_active <= 0.5F ? 1U : 0U;  // NaN: not known
   }
-  if (sample.has(Signal::kWorkpieceDiameter)) own_.diameter_m = sample.workpiece_diameter_m;
+  if (sample.has(Signal::kWorkpieceDiameter)) {
+    const float diameter_m = sample.workpiece_diameter_m;
+    own_.diameter_m = diameter_m > 0.0F && diameter_m < kDiameterMost_m ? diameter_m : 0.0F;
+  }
   if (sample.has(Signal::kEnable)) own_.enabled = sample.enable > 0.5F ? 1U : 0U;
   own_.override_reported = sample.has(Signal::kOverrideApplied) ? 1U : 0U;
   own_.override_reported_pct = sample.override_applied_pct;
-  if (sample.has(Signal::kMeasuredForce)) {
+  if (sample.has(Signal::kMeasuredForce) && sample.measured_force_n < kForceMost_n &&
+      sample.measured_force_n > -kForceMost_n) {
     own_.dynamometer_n += sample.measured_force_n;
     ++own_.dynamometer_count;
   }
@@ -134,6 +141,10 @@ auto ControlLoop::step(const hal::Sample& sample) noexcept -> std::optional<Loop
   own_.speed_present = speed_valid ? 1U : 0U;
   own_.meter_w = values.power_w;
   own_.meter_present = meter_valid ? 1U : 0U;
+  // Samples that are missing or held shift the phase of all that follow in the window.
+  if (gated.missing_samples != 0 || gated.verdict == SampleGate::Verdict::kBridge) {
+    calibration_.close();
+  }
   if (calibration_.is_open()) {
     estimator::IdleCalibration::Channels channels{};
     const estimator::Calibration& c = own_.calibration;
@@ -305,6 +316,20 @@ void ControlLoop::estimate_path(LoopOutput& out) const noexcept {
   out.present |= LoopOutput::kAirGapTorque | LoopOutput::kLoadTorque | LoopOutput::kCuttingTorque;
 }
 
+// What a bad voltage makes the flux turn at is no frequency to judge that voltage by: where the two
+// disagree by more than any slip, the shaft knows better.
+float ControlLoop::path_frequency_rad_s() const noexcept {
+  const float pole_pairs = config_.path.synchronous.pole_pairs;
+  const bool valid = own_.has_path != 0 && own_.path.speed_valid;
+  const float synchronous = valid ? own_.path.synchronous_rad_s * pole_pairs : 0.0F;
+  if (own_.speed_present == 0) return synchronous;
+  const float shaft = own_.speed_rad_s * pole_pairs;
+  const float size = shaft < 0.0F ? -shaft : shaft;
+  const float apart = synchronous - shaft;
+  const bool agree = apart <= kSlipMost_ratio * size && apart >= -kSlipMost_ratio * size;
+  return valid && (agree || size < kTurning_rad_s) ? synchronous : shaft;
+}
+
 void ControlLoop::estimate_dynamometer(LoopOutput& out) noexcept {
   out.state = LoopState::kNoEstimate;
   if (own_.dynamometer_count == 0) return;
@@ -373,9 +398,7 @@ auto ControlLoop::close_estimate() noexcept -> LoopOutput {
     case EstimatorName::kComputed:
     case EstimatorName::kSynthesized:
       estimate_path(out);
-      own_.frequency_rad_s = own_.has_path != 0 && own_.path.speed_valid
-                                 ? own_.path.synchronous_rad_s * config_.path.synchronous.pole_pairs
-                                 : 0.0F;
+      own_.frequency_rad_s = path_frequency_rad_s();
       break;
   }
   const bool by_motor = config_.estimator != EstimatorName::kDynamometer;
@@ -391,6 +414,9 @@ auto ControlLoop::close_estimate() noexcept -> LoopOutput {
       out.faults = faults;
     }
     add_force(out);
+  } else {
+    out.faults = own_.faults;
+    own_.faults = {};
   }
   if ((out.present & LoopOutput::kCuttingForce) != 0 && !(by_motor && doubtful(out.faults))) {
     own_.force_n += out.cutting_force_n;

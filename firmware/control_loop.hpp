@@ -134,6 +134,7 @@ class ControlLoop {
   [[nodiscard]] LoopOutput close_estimate() noexcept;
   void estimate_fused(LoopOutput& out) noexcept;
   void estimate_path(LoopOutput& out) const noexcept;
+  [[nodiscard]] float path_frequency_rad_s() const noexcept;
   void estimate_dynamometer(LoopOutput& out) noexcept;
   void add_force(LoopOutput& out) noexcept;
   void control_tick(LoopOutput& out) noexcept;

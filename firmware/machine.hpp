@@ -43,7 +43,7 @@ struct Machine {
   std::array<float, 3> voltage_offset_v;
   std::array<float, 3> current_gain_ratio;
   std::array<float, 3> current_offset_a;
-  float voltage_lead_s;  // voltages are this much ahead of the currents
+  float voltage_lead_s;  // voltages stand for an instant this much after the currents'
   float voltage_limit_v;
   float current_limit_a;
   float speed_limit_rad_s;

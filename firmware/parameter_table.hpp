@@ -131,8 +131,8 @@ inline constexpr std::string_view kDerived = "derived from the rating";
                                    "What each current channel reads at no current."),
       number<&M::voltage_lead_s>(
           0x010a, "voltage_lead_s", "s", {-0.01F, 0.01F}, 0, 0, kConstruction,
-          "How much earlier the voltages are sampled than the currents; a drive's voltage "
-          "reference leads by half its switching period."),
+          "How much later the instant is that a voltage stands for than that of its current; a "
+          "drive's voltage reference leads by half its switching period."),
       number<&M::voltage_limit_v>(
           0x010b, "voltage_limit_v", "V", {1, 20000}, 20000, 400, kConstruction,
           "Peak (not rms) beyond which a voltage sample is not believed: the end of "

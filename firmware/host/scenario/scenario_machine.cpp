@@ -55,7 +55,7 @@ void set_signals(Machine& m, const SimulatedMachineConfig& s) {
   m.current_w_present = s.sensors.current_w_present;
   m.speed_present = s.sensors.speed.present;
   m.power_meter_present = s.sensors.power_meter.present;
-  m.voltage_lead_s = narrow(-s.sensors.voltage_lead_s);
+  m.voltage_lead_s = narrow(s.sensors.voltage_lead_s);
   m.speed_lag_s = narrow(s.sensors.speed.lag_s);
   const auto& meter = s.sensors.power_meter;
   const bool reads = meter.scale != 0.0;
