@@ -52,7 +52,7 @@ class RunUpInertia {
     float gained_rad_s = 0.0F;
     float time_s = 0.0F;
     float turned_rad = 0.0F;       // in this episode
-    std::uint32_t calibrated = 0;  // all through it
+    std::uint32_t calibrated = 1;  // all through it
     float last_speed_rad_s = 0.0F;
     float inertia_kg_m2 = 0.0F;
     float sigma_ratio = 0.0F;

@@ -3,7 +3,6 @@
 
 #include <benchmark/benchmark.h>
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -17,6 +16,7 @@
 #include "firmware/host/trace_writer.hpp"
 #include "hal/host/recording_reader.hpp"
 #include "hal/host/recording_writer.hpp"
+#include "host_tests/benchmarks/recorded_cut.hpp"
 
 namespace cutforce {
 namespace {
@@ -24,54 +24,8 @@ namespace {
 using hal::Sample;
 using hal::Signal;
 
-constexpr std::size_t kRows = 400'000;
-
-// Files of this process, removed at its end.
-class Files {
- public:
-  static const Files& get() {
-    static const Files files;
-    return files;
-  }
-  [[nodiscard]] std::filesystem::path operator/(const char* name) const { return folder_ / name; }
-  Files(const Files&) = delete;
-  Files& operator=(const Files&) = delete;
-
- private:
-  Files()
-      : folder_(std::filesystem::temp_directory_path() /
-                ("cutforce-benchmark-" + std::to_string(std::random_device{}()))) {
-    std::filesystem::create_directories(folder_);
-    make_recording();
-    for (const auto* const name : {"r.csv.gz", "r.cfr"}) {
-      if (!hal::host::convert_recording(folder_ / "r.csv", folder_ / name)) std::abort();
-    }
-  }
-  ~Files() {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
-  }
-
-  // Rounded as an instrument writes them, so that the text is as long as real text.
-  void make_recording() const {
-    std::ofstream out(folder_ / "r.csv");
-    out << "# cutforce recording 1\n"
-           "t_s,v_un_v,v_vn_v,v_wn_v,i_u_a,i_v_a,i_w_a,speed_rad_s,power_meter_w\n";
-    char row[200];
-    for (std::size_t k = 0; k < kRows; ++k) {
-      const double t_s = static_cast<double>(k) * 50e-6;
-      const auto wave = [t_s](double peak, double lag) {
-        return peak * std::cos(314.0 * t_s - lag);
-      };
-      std::snprintf(row, sizeof row, "%.6f,%.2f,%.2f,%.2f,%.4f,%.4f,%.4f,%.4f,%.2f\n", t_s,
-                    wave(311, 0), wave(311, 2.0944), wave(311, 4.1888), wave(7, 0.5),
-                    wave(7, 2.5944), wave(7, 4.6888), 157 + wave(0.3, 0), 1800 + wave(50, 1));
-      out << row;
-    }
-  }
-
-  std::filesystem::path folder_;
-};
+using Files = benchmarks::RecordingFiles;
+constexpr std::size_t kRows = Files::kRows;
 
 void count(benchmark::State& state, std::size_t rows, const std::filesystem::path& file) {
   state.SetItemsProcessed(static_cast<std::int64_t>(rows));
