@@ -63,7 +63,7 @@ class FrontEnd {
     CurrentChannels currents;
     Calibration calibration;  // to begin with
 
-    // kVoltageGain, kCurrentGain: not a positive finite number; the offsets: not finite.
+    // kVoltageGain, kCurrentGain: 0 or not finite; the offsets: not finite.
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       return check_calibration(calibration);
     }
@@ -139,7 +139,11 @@ class FrontEnd {
 constexpr std::expected<void, FrontEnd::ConfigError> FrontEnd::check_calibration(
     const Calibration& calibration) noexcept {
   constexpr float kMost = 1e6F;  // beyond any sensor; products stay far from overflow
-  const auto gain = [](float g) { return g > 1.0F / kMost && g < kMost; };
+  // A sensor that is mounted the wrong way round has a negative gain.
+  const auto gain = [](float g) {
+    const float size = g < 0.0F ? -g : g;
+    return size > 1.0F / kMost && size < kMost;
+  };
   const auto offset = [](float o) { return o > -kMost && o < kMost; };
   for (const float g : calibration.voltage_gain_ratio)
     if (!gain(g)) return std::unexpected{ConfigError::kVoltageGain};

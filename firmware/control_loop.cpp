@@ -96,6 +96,8 @@ void ControlLoop::restart() noexcept {
   health_.restart();
   calibration_.close();
   own_.has_path = 0;
+  own_.force_n = own_.force_sigma_n = 0.0F;
+  own_.force_count = own_.force_due = 0;
 }
 
 void ControlLoop::note_commands(const hal::Sample& sample) noexcept {
@@ -334,6 +336,9 @@ void ControlLoop::estimate_dynamometer(LoopOutput& out) noexcept {
   out.state = LoopState::kNoEstimate;
   if (own_.dynamometer_count == 0) return;
   out.cutting_force_n = own_.dynamometer_n / static_cast<float>(own_.dynamometer_count);
+  // The means of equal windows: the controller's mean of them weighs every sample the same.
+  own_.dynamometer_n = 0.0F;
+  own_.dynamometer_count = 0;
   out.cutting_force_sigma_n = config_.dynamometer_sigma_n;
   out.source = Source::kDynamometer;
   out.state = out.cutting_force_n >
@@ -377,8 +382,6 @@ void ControlLoop::control_tick(LoopOutput& out) noexcept {
               .controlling = controlled.controlling};
   own_.force_n = own_.force_sigma_n = 0.0F;
   own_.force_count = own_.force_due = 0;
-  own_.dynamometer_n = 0.0F;
-  own_.dynamometer_count = 0;
   out.control_tick = true;
 }
 
@@ -422,7 +425,7 @@ auto ControlLoop::close_estimate() noexcept -> LoopOutput {
     own_.force_n += out.cutting_force_n;
     own_.force_sigma_n += out.cutting_force_sigma_n;
     ++own_.force_count;
-  } else {
+  } else if (by_motor) {  // a dynamometer may be slower than the estimate period
     ++own_.force_due;
   }
   if (control) {

@@ -197,7 +197,7 @@ TEST(FrontEnd, RefusesGainsAndOffsetsThatAreNoNumbers) {
   constexpr float kInf = std::numeric_limits<float>::infinity();
   using Error = FrontEnd::ConfigError;
   for (std::size_t k = 0; k < 3; ++k) {
-    for (const float bad : {kNan, kInf, -kInf, 0.0F, -1.0F, 1e-30F, 1e30F}) {
+    for (const float bad : {kNan, kInf, -kInf, 0.0F, 1e-30F, -1e-30F, 1e30F, -1e30F}) {
       Calibration c = kPerfect;
       c.voltage_gain_ratio[k] = bad;
       EXPECT_EQ(FrontEnd::make({kStar.voltages, kStar.currents, c}).error(), Error::kVoltageGain);

@@ -30,7 +30,7 @@ float torque_in_the_cut(float told_s) {
   machine.inertia_kg_m2 = 0.03F;
   machine.coulomb_torque_nm = 0.4F;
   machine.viscous_nm_s_rad = 0.002F;
-  machine.load_friction_ratio = {0.0F, 0.0F, 0.0F};
+  machine.load_friction_ratio = {0.05F, 0.05F, 0.05F};
   machine.speed_present = true;
   machine.current_w_present = true;
   machine.sample_rate_hz = 5000.0F;

@@ -68,10 +68,13 @@ class CsvRows final : public RowSource {
                         Truth& truth) {
     const Column& column = columns_[index];
     switch (column.role) {
-      case ColumnRole::kTime: return read_time_cell(index, at, end, sample);
+      case ColumnRole::kTime:
+        return read_time_cell(index, at, end, sample);
       case ColumnRole::kSample:
-      case ColumnRole::kTruth: break;
-      case ColumnRole::kIgnored: return skip_cell(at, end);
+      case ColumnRole::kTruth:
+        break;
+      case ColumnRole::kIgnored:
+        return skip_cell(at, end);
     }
     Cell<float> cell{};
     if (column.units_per_si == 1.0) {

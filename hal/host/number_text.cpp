@@ -167,11 +167,16 @@ Cell<std::int64_t> read_unusual_time(const char* begin, const char* end) noexcep
 
 std::string_view describe(CellState state) noexcept {
   switch (state) {
-    case CellState::kValue: return "is a number";
-    case CellState::kEmpty: return "is empty";
-    case CellState::kNotANumber: return "is not a number";
-    case CellState::kNotFinite: return "is not a finite number";
-    case CellState::kOutOfRange: return "is out of range";
+    case CellState::kValue:
+      return "is a number";
+    case CellState::kEmpty:
+      return "is empty";
+    case CellState::kNotANumber:
+      return "is not a number";
+    case CellState::kNotFinite:
+      return "is not a finite number";
+    case CellState::kOutOfRange:
+      return "is out of range";
   }
   return "";
 }

@@ -12,8 +12,8 @@
 #include "hal/host/csv_recording.hpp"
 #include "hal/host/line_reader.hpp"
 #include "hal/host/number_text.hpp"
-#include "hal/host/plain_text.hpp"
 #include "hal/host/output_file.hpp"
+#include "hal/host/plain_text.hpp"
 #include "hal/host/truth_reader.hpp"
 
 namespace cutforce::hal::host {

@@ -15,16 +15,16 @@ enum class VoltageSampling { kAveraged, kRawPwm };
 
 struct MotorCondition {
   double sample_rate_hz = 5000.0;
-  double speed_rpm = 1500.0;       // synchronous, two pole pairs; negative: backward
+  double speed_rpm = 1500.0;  // synchronous, two pole pairs; negative: backward
   double run_up_s = 0.0;
-  double load = 0.0;               // 1: rated torque
-  double noise = 0.005;            // of rated peak, rms per channel
-  bool quantised = true;           // 12 bit over +-800 V and +-28.28 A
-  double offset = 0.0;             // of rated peak
+  double load = 0.0;      // 1: rated torque
+  double noise = 0.005;   // of rated peak, rms per channel
+  bool quantised = true;  // 12 bit over +-800 V and +-28.28 A
+  double offset = 0.0;    // of rated peak
   double gain_error = 0.0;
   VoltageSampling voltage = VoltageSampling::kAveraged;
   double carrier_hz = 4000.0;
-  double carrier_phase = 0.0;      // of the sampling in the carrier, 0..1
+  double carrier_phase = 0.0;  // of the sampling in the carrier, 0..1
 };
 
 class MotorSignals {
@@ -47,7 +47,8 @@ class MotorSignals {
   Sample next() {
     const double t = static_cast<double>(n_++) / condition.sample_rate_hz;
     const double rated = condition.speed_rpm / 60.0 * 2.0 * 2.0 * std::numbers::pi;
-    const double w = condition.run_up_s > 0.0 ? rated * std::min(t / condition.run_up_s, 1.0) : rated;
+    const double w =
+        condition.run_up_s > 0.0 ? rated * std::min(t / condition.run_up_s, 1.0) : rated;
     theta_ += w / condition.sample_rate_hz;
     const double active = 7.0 * condition.load + 0.3;
     const double peak_v = std::min(std::fabs(w) * kFlux + kResistance * active + 5.0, 311.0);
@@ -69,7 +70,8 @@ class MotorSignals {
     std::normal_distribution<double> normal;
     const double rated = is_voltage ? 326.0 : 7.07;
     const double range = is_voltage ? 800.0 : 28.28;
-    double x = value * (1.0 + condition.gain_error) + rated * (condition.offset + condition.noise * normal(random_));
+    double x = value * (1.0 + condition.gain_error) +
+               rated * (condition.offset + condition.noise * normal(random_));
     if (condition.quantised) {
       const double step = range / 2048.0;
       x = step * std::clamp(std::round(x / step), -2048.0, 2047.0);

@@ -46,14 +46,21 @@ void write_recording(const SimulatedMachineConfig& config, double duration_s,
                static_cast<unsigned long long>(config.seed));
   for (const Row& row : run_open_loop(config, duration_s)) {
     const Sample& s = row.sample;
-    const std::array<double, 15> values{
-        row.time_s(), static_cast<double>(s.voltage_v[0]), static_cast<double>(s.voltage_v[1]),
-        static_cast<double>(s.voltage_v[2]), static_cast<double>(s.current_a[0]),
-        static_cast<double>(s.current_a[1]), static_cast<double>(s.current_a[2]),
-        static_cast<double>(s.speed_rad_s), static_cast<double>(s.power_meter_w),
-        static_cast<double>(s.feed_active), static_cast<double>(s.override_applied_pct),
-        row.truth.airgap_torque_nm, row.truth.load_torque_nm, row.truth.cutting_torque_nm,
-        row.truth.cutting_force_n};
+    const std::array<double, 15> values{row.time_s(),
+                                        static_cast<double>(s.voltage_v[0]),
+                                        static_cast<double>(s.voltage_v[1]),
+                                        static_cast<double>(s.voltage_v[2]),
+                                        static_cast<double>(s.current_a[0]),
+                                        static_cast<double>(s.current_a[1]),
+                                        static_cast<double>(s.current_a[2]),
+                                        static_cast<double>(s.speed_rad_s),
+                                        static_cast<double>(s.power_meter_w),
+                                        static_cast<double>(s.feed_active),
+                                        static_cast<double>(s.override_applied_pct),
+                                        row.truth.airgap_torque_nm,
+                                        row.truth.load_torque_nm,
+                                        row.truth.cutting_torque_nm,
+                                        row.truth.cutting_force_n};
     for (std::size_t k = 0; k < values.size(); ++k) {
       std::fprintf(file, "%.9g%c", values[k], k + 1 < values.size() ? ',' : '\n');
     }

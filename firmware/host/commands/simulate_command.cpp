@@ -107,16 +107,13 @@ void add_simulate(CLI::App& program, Action& action) {
       program.add_subcommand("simulate", "A scenario in closed loop: recording, trace, report");
   auto options = std::make_shared<Options>();
   command->add_option("SCENARIO", options->scenario, "Scenario file (TOML)");
-  command
-      ->add_option("--out", options->out,
-                   "Folder for the files; left out: out/SCENARIO")
+  command->add_option("--out", options->out, "Folder for the files; left out: out/SCENARIO")
       ->type_name("DIR");
   command
       ->add_option("--recording", options->recording,
                    "Write only the recording, to this file (.csv, .csv.gz, .cfr)")
       ->type_name("FILE");
-  command->add_flag("--compare", options->compare,
-                    "Also P3's estimators, on the same samples");
+  command->add_flag("--compare", options->compare, "Also P3's estimators, on the same samples");
   command->add_flag("--template", options->make_template,
                     "Print a commented scenario with every key instead");
   command->add_flag("--json", options->json, "Print the summary as JSON");

@@ -20,17 +20,30 @@ SineCosine sine_cosine(double x_rad) noexcept {
   const double q = r * r;
   // Taylor sums; at pi/4 the first term left out is below 1e-16.
   const double s =
-      r * (1.0 + q * (-1.0 / 6 + q * (1.0 / 120 + q * (-1.0 / 5040 + q * (1.0 / 362880 +
-      q * (-1.0 / 39916800 + q * (1.0 / 6227020800.0 + q * (-1.0 / 1307674368000.0))))))));
+      r * (1.0 + q * (-1.0 / 6 +
+                      q * (1.0 / 120 +
+                           q * (-1.0 / 5040 +
+                                q * (1.0 / 362880 + q * (-1.0 / 39916800 +
+                                                         q * (1.0 / 6227020800.0 +
+                                                              q * (-1.0 / 1307674368000.0))))))));
   const double c =
-      1.0 + q * (-0.5 + q * (1.0 / 24 + q * (-1.0 / 720 + q * (1.0 / 40320 + q * (-1.0 / 3628800 +
-      q * (1.0 / 479001600.0 + q * (-1.0 / 87178291200.0 + q * (1.0 / 20922789888000.0))))))));
+      1.0 +
+      q * (-0.5 + q * (1.0 / 24 +
+                       q * (-1.0 / 720 +
+                            q * (1.0 / 40320 + q * (-1.0 / 3628800 +
+                                                    q * (1.0 / 479001600.0 +
+                                                         q * (-1.0 / 87178291200.0 +
+                                                              q * (1.0 / 20922789888000.0))))))));
   const double turns = quarters * 0.25;
   switch (static_cast<int>(4.0 * (turns - std::floor(turns)))) {
-    case 0: return {s, c};
-    case 1: return {c, -s};
-    case 2: return {-s, -c};
-    default: return {-c, s};
+    case 0:
+      return {s, c};
+    case 1:
+      return {c, -s};
+    case 2:
+      return {-s, -c};
+    default:
+      return {-c, s};
   }
 }
 
@@ -53,8 +66,15 @@ double logarithm(double x) noexcept {
   }
   const double s = (m - 1.0) / (m + 1.0);
   const double q = s * s;
-  const double tail = q * (1.0 / 3 + q * (1.0 / 5 + q * (1.0 / 7 + q * (1.0 / 9 + q * (1.0 / 11 +
-      q * (1.0 / 13 + q * (1.0 / 15 + q * (1.0 / 17 + q * (1.0 / 19 + q * (1.0 / 21))))))))));
+  const double tail =
+      q * (1.0 / 3 +
+           q * (1.0 / 5 +
+                q * (1.0 / 7 +
+                     q * (1.0 / 9 +
+                          q * (1.0 / 11 +
+                               q * (1.0 / 13 +
+                                    q * (1.0 / 15 +
+                                         q * (1.0 / 17 + q * (1.0 / 19 + q * (1.0 / 21))))))))));
   return exponent * kLn2High + (exponent * kLn2Low + 2.0 * (s + s * tail));
 }
 

@@ -48,8 +48,7 @@ double CuttingProcess::plain_load_nm(double time_s) noexcept {
   double torque_nm = torque_.value(load_.torque_nm, time_s);
   for (const Oscillation& o : load_.oscillations) {
     if (time_s < o.begin_s || time_s >= o.end_s) continue;
-    torque_nm +=
-        o.amplitude_nm * sine_cosine(kTwoPi * o.frequency_hz * (time_s - o.begin_s)).sine;
+    torque_nm += o.amplitude_nm * sine_cosine(kTwoPi * o.frequency_hz * (time_s - o.begin_s)).sine;
   }
   return torque_nm;
 }
@@ -59,7 +58,7 @@ void CuttingProcess::step(const ProcessInput& input) noexcept {
   state_.diameter_m = diameter_.value(process_.diameter_m, input.position_m);
   if (process_.specific_force_n_m2 > 0.0) {
     state_.force_n = lagged(state_.force_n, static_force_n(input), lag_share_);  // (S31)
-    torque_nm += state_.force_n * 0.5 * state_.diameter_m / gear_ratio_;      // (S32)
+    torque_nm += state_.force_n * 0.5 * state_.diameter_m / gear_ratio_;         // (S32)
   } else {
     state_.force_n = torque_nm * gear_ratio_ / (0.5 * state_.diameter_m);
   }

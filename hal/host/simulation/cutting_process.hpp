@@ -20,16 +20,16 @@ struct HardSpot {
 };
 
 struct ProcessConfig {
-  double specific_force_n_m2 = 0.0;     // k_s; 0: no cutting process
-  double nominal_feed_m_rev = 1.0;      // h_0
-  double exponent = 1.0;                // p
-  double lag_s = 0.0;                   // tau_p
-  Profile depth_m{0.0};                 // over position
-  Profile diameter_m{1.0};              // over position
-  Profile wear_ratio{1.0};              // over time
+  double specific_force_n_m2 = 0.0;  // k_s; 0: no cutting process
+  double nominal_feed_m_rev = 1.0;   // h_0
+  double exponent = 1.0;             // p
+  double lag_s = 0.0;                // tau_p
+  Profile depth_m{0.0};              // over position
+  Profile diameter_m{1.0};           // over position
+  Profile wear_ratio{1.0};           // over time
   std::vector<HardSpot> hard_spots{};
-  double slots_per_turn = 0.0;          // interrupted cut; 0: none
-  double slot_ratio = 0.0;              // share of a pitch without material
+  double slots_per_turn = 0.0;  // interrupted cut; 0: none
+  double slot_ratio = 0.0;      // share of a pitch without material
   double slots_begin_m = 0.0;
   double slots_end_m = 0.0;
 };
@@ -42,14 +42,14 @@ struct Oscillation {
 };
 
 struct LoadConfig {
-  Profile torque_nm{0.0};               // cutting torque at the motor, over time
+  Profile torque_nm{0.0};  // cutting torque at the motor, over time
   std::vector<Oscillation> oscillations{};
 };
 
 // Friction that the cutting load causes, P3 (8): f(w) T_c + g(w) T_c^2.
 struct LoadFrictionConfig {
-  Profile ratio{0.0};                   // f over |motor speed|
-  Profile per_nm_1_nm{0.0};             // g over |motor speed|
+  Profile ratio{0.0};        // f over |motor speed|
+  Profile per_nm_1_nm{0.0};  // g over |motor speed|
 };
 
 struct ProcessInput {
@@ -57,7 +57,7 @@ struct ProcessInput {
   double position_m;
   double feed_m_s;
   double spindle_turns_s;
-  double spindle_turns;       // angle
+  double spindle_turns;  // angle
   double motor_speed_rad_s;
 };
 

@@ -17,8 +17,8 @@ enum class DriveControl : std::uint8_t { kVoltsPerHertz, kVector };
 
 struct DriveConfig {
   DriveControl control;
-  double period_s;                          // of control, and length of a hold
-  Profile speed_reference_rad_s;            // motor shaft, over time
+  double period_s;                // of control, and length of a hold
+  Profile speed_reference_rad_s;  // motor shaft, over time
   // Volts per hertz.
   double resistance_compensation_ratio = 0.0;  // of R_s i_0, at and near standstill
   double slip_compensation_ratio = 0.0;        // 1: speed kept under load
@@ -29,14 +29,14 @@ struct DriveConfig {
   double speed_bandwidth_rad_s = 0.0;
   double current_bandwidth_rad_s = 0.0;
   double torque_limit_nm = 0.0;
-  double current_limit_a = 0.0;             // peak
-  double voltage_use_ratio = 0.95;          // share of the linear range before field weakening
+  double current_limit_a = 0.0;     // peak
+  double voltage_use_ratio = 0.95;  // share of the linear range before field weakening
 };
 
 struct DriveInput {
   double time_s;
   Complex current_a;
-  Complex rotor_flux_vs;      // Gamma
+  Complex rotor_flux_vs;  // Gamma
   double speed_rad_s;
 };
 
@@ -62,9 +62,9 @@ class Drive {
     Complex current_integral_v;
     double flux_current_a = 0.0;
     double frame_speed_rad_s = 0.0;
-    Complex wanted_v;        // last, rotor-flux frame
+    Complex wanted_v;  // last, rotor-flux frame
     Complex error_a;
-    Complex outward;         // from the rotor-flux frame to the stator, as used for wanted_v
+    Complex outward;  // from the rotor-flux frame to the stator, as used for wanted_v
     bool running = false;
   };
   [[nodiscard]] Complex volts_per_hertz(const DriveInput& input, double reference) noexcept;
@@ -76,9 +76,9 @@ class Drive {
   DriveConfig config_;
   double pole_pairs_;
   double resistance_ohm_;
-  double rated_flux_vs_;         // stator
-  InverseGamma motor_;           // at rated flux
-  double flux_ratio_;            // rotor flux, inverse-Gamma over Gamma
+  double rated_flux_vs_;  // stator
+  InverseGamma motor_;    // at rated flux
+  double flux_ratio_;     // rotor flux, inverse-Gamma over Gamma
   double inertia_kg_m2_;
   double rated_flux_current_a_;
   double voltage_limit_v_;

@@ -30,11 +30,9 @@ void FeedServo::step(double time_s, double spindle_turns_s) noexcept {
   state_.override_pct = latency_.push(scanned_pct_);  // (S28)
 
   state_.feeding = time_s >= config_.start_s && state_.position_m < config_.length_m;
-  const double programmed_m_s = config_.feed_m_rev > 0.0
-                                    ? config_.feed_m_rev * std::abs(spindle_turns_s)
-                                    : config_.feed_m_s;
-  const double wanted_m_s =
-      state_.feeding ? 0.01 * state_.override_pct * programmed_m_s : 0.0;
+  const double programmed_m_s =
+      config_.feed_m_rev > 0.0 ? config_.feed_m_rev * std::abs(spindle_turns_s) : config_.feed_m_s;
+  const double wanted_m_s = state_.feeding ? 0.01 * state_.override_pct * programmed_m_s : 0.0;
   // Exact for a constant command over the period, (S29).
   const double gap_m_s = state_.feed_m_s - wanted_m_s;
   state_.position_m += wanted_m_s * period_s_ + gap_m_s * config_.lag_s * lag_share_;

@@ -10,15 +10,15 @@
 namespace cutforce::hal::host {
 
 struct FeedConfig {
-  double start_s = 0.0;              // time at which the program starts to feed
-  double feed_m_rev = 0.0;           // at 100 %, per spindle turn; 0: use feed_m_s
-  double feed_m_s = 0.0;             // at 100 %, per time
-  double length_m = 0.0;             // end of the path
-  double cutting_move_start_m = 0.0; // from there on the CNC reports a cutting move
-  double latency_s = 0.0;            // dead time after the scan
-  double scan_s = 0.0;               // PLC scan; its phase is drawn from the seed; 0: no scan
-  double scan_jitter_s = 0.0;        // every scan is late by up to this
-  double lag_s = 0.0;                // feed servo
+  double start_s = 0.0;               // time at which the program starts to feed
+  double feed_m_rev = 0.0;            // at 100 %, per spindle turn; 0: use feed_m_s
+  double feed_m_s = 0.0;              // at 100 %, per time
+  double length_m = 0.0;              // end of the path
+  double cutting_move_start_m = 0.0;  // from there on the CNC reports a cutting move
+  double latency_s = 0.0;             // dead time after the scan
+  double scan_s = 0.0;                // PLC scan; its phase is drawn from the seed; 0: no scan
+  double scan_jitter_s = 0.0;         // every scan is late by up to this
+  double lag_s = 0.0;                 // feed servo
   double initial_override_pct = 100.0;
 };
 

@@ -65,8 +65,8 @@ double InductionMotor::iron_w(const MotorInstant& at) const noexcept {
 
 double InductionMotor::magnetic_energy_j(const MotorFlux& flux) const noexcept {
   const double q = squared(flux.stator_vs);
-  const double main = inverse_inductance_1_h_ * q *
-                      (0.5 + saturation(q) / (config_.saturation_exponent + 2.0));
+  const double main =
+      inverse_inductance_1_h_ * q * (0.5 + saturation(q) / (config_.saturation_exponent + 2.0));
   const double leakage = 0.5 * inverse_leakage_1_h_ * squared(flux.rotor_vs - flux.stator_vs);
   return 1.5 * (main + leakage);  // (S8)
 }

@@ -28,7 +28,7 @@ struct MotorConfig {
   double rated_speed_rad_s;          // electrical, of the supply
   double rated_torque_nm;
   double rated_current_a_rms;
-  double resistance_slope_1_k = 0.0;  // copper: 0.0039
+  double resistance_slope_1_k = 0.0;    // copper: 0.0039
   double thermal_resistance_k_w = 0.0;  // rise per watt of stator copper loss; 0: stays cold
   double thermal_time_s = 600.0;
   double initial_rise_k = 0.0;
@@ -51,12 +51,12 @@ struct MotorFlux {
 
 // What follows from flux, voltage and speed at one instant.
 struct MotorInstant {
-  Complex emf_v;             // d psi_s/dt
-  Complex rotor_slope_v;     // d psi_r/dt
+  Complex emf_v;          // d psi_s/dt
+  Complex rotor_slope_v;  // d psi_r/dt
   Complex magnetic_current_a;
   Complex line_current_a;
   Complex rotor_current_a;
-  double torque_nm;          // air gap, acting on the rotor
+  double torque_nm;  // air gap, acting on the rotor
 };
 
 class InductionMotor {
@@ -88,9 +88,9 @@ class InductionMotor {
   double stator_resistance_ohm_ = 0.0;
   double inverse_leakage_1_h_;
   double inverse_inductance_1_h_;
-  double emf_share_ = 1.0;   // 1/(1 + R_s g)
+  double emf_share_ = 1.0;  // 1/(1 + R_s g)
   double beta_squared_;
-  int whole_exponent_;       // S where it is a small whole number, else -1
+  int whole_exponent_;  // S where it is a small whole number, else -1
 };
 
 // Inline: called four times in every step.
@@ -104,7 +104,7 @@ inline double InductionMotor::saturation(double flux_squared) const noexcept {
 }
 
 inline MotorInstant InductionMotor::instant(const MotorFlux& flux, Complex voltage_v,
-                                     double speed_rad_s) const noexcept {
+                                            double speed_rad_s) const noexcept {
   MotorInstant at{};
   const double inverse_h =
       inverse_inductance_1_h_ * (1.0 + saturation(squared(flux.stator_vs)));  // (S4)
@@ -113,7 +113,7 @@ inline MotorInstant InductionMotor::instant(const MotorFlux& flux, Complex volta
   at.emf_v = emf_share_ * (voltage_v - stator_resistance_ohm_ * at.magnetic_current_a);  // (S2)
   at.line_current_a = at.magnetic_current_a + config_.iron_conductance_s * at.emf_v;
   at.rotor_slope_v = (config_.pole_pairs * speed_rad_s) * turned_left(flux.rotor_vs) -
-                     config_.rotor_resistance_ohm * at.rotor_current_a;  // (S3)
+                     config_.rotor_resistance_ohm * at.rotor_current_a;                    // (S3)
   at.torque_nm = 1.5 * config_.pole_pairs * cross(flux.stator_vs, at.magnetic_current_a);  // (S5)
   return at;
 }

@@ -13,16 +13,16 @@ namespace cutforce::hal::host {
 
 struct InverterConfig {
   double dc_link_v;
-  bool switched = false;        // false: averaged
+  bool switched = false;  // false: averaged
   double dead_time_s = 0.0;
-  double device_drop_v = 0.0;   // of the conducting switch or diode
-  double anti_alias_hz = 0.0;   // corner of equal filters on v and i; 0: none
+  double device_drop_v = 0.0;  // of the conducting switch or diode
+  double anti_alias_hz = 0.0;  // corner of equal filters on v and i; 0: none
 };
 
 class Inverter {
  public:
   struct Edge {
-    std::int64_t offset_ns;     // from the begin of the hold
+    std::int64_t offset_ns;  // from the begin of the hold
     std::uint8_t phase;
     bool up;
   };

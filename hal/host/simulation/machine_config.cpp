@@ -56,8 +56,8 @@ void check_motor(Checker& c, const MotorConfig& m) {
   c.positive(m.stator_inductance_h, "motor.stator_inductance_h", 100.0);
   c.within(m.saturation_1_vs, "motor.saturation_1_vs", 0.0, 1e3);
   c.within(m.saturation_exponent, "motor.saturation_exponent", 0.0, 30.0);
-  c.require(!(m.saturation_1_vs > 0.0) || m.saturation_exponent >= 1.0,
-            "motor.saturation_exponent", "is missing while saturation_1_vs is given",
+  c.require(!(m.saturation_1_vs > 0.0) || m.saturation_exponent >= 1.0, "motor.saturation_exponent",
+            "is missing while saturation_1_vs is given",
             "give at least 1, or leave saturation_1_vs 0");
   c.within(m.iron_conductance_s, "motor.iron_conductance_s", 0.0, 1.0);
   c.positive(m.rated_flux_vs, "motor.rated_flux_vs", 100.0);

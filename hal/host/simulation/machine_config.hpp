@@ -27,7 +27,7 @@ struct SimulatedMachineConfig {
   InverterConfig inverter;
   DriveConfig drive;
   SpindleConfig spindle;
-  Profile friction_ratio{1.0};         // of Coulomb and viscous friction, over time: warming up
+  Profile friction_ratio{1.0};  // of Coulomb and viscous friction, over time: warming up
   LoadFrictionConfig load_friction{};
   ProcessConfig process{};
   LoadConfig load{};

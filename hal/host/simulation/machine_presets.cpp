@@ -8,9 +8,7 @@ constexpr double kRoot2 = 1.41421356237309504880;
 constexpr double kRpm = kTwoPi / 60.0;  // rad/s
 
 // Magnetise for 0.15 s, then ramp up in 0.6 s: idle from 1 s on.
-Profile run_up(double speed_rad_s) {
-  return Profile{{0.0, 0.0}, {0.15, 0.0}, {0.75, speed_rad_s}};
-}
+Profile run_up(double speed_rad_s) { return Profile{{0.0, 0.0}, {0.15, 0.0}, {0.75, speed_rad_s}}; }
 
 SimulatedMachineConfig on_400_v(const MotorConfig& motor, double inertia_kg_m2) {
   return {.sample_rate_hz = 5000.0,
@@ -90,9 +88,7 @@ SimulatedMachineConfig default_lathe() {
                     .current_bandwidth_rad_s = kTwoPi * 120.0,
                     .torque_limit_nm = 60.0,
                     .current_limit_a = 70.0},
-          .spindle = {.inertia_kg_m2 = 0.12,
-                      .coulomb_torque_nm = 2.0,
-                      .viscous_nm_s_rad = 0.008},
+          .spindle = {.inertia_kg_m2 = 0.12, .coulomb_torque_nm = 2.0, .viscous_nm_s_rad = 0.008},
           // 0.06 + 1e-4 (w - 105)
           .load_friction = {.ratio = Profile{{0.0, 0.0495}, {105.0, 0.06}, {315.0, 0.081}},
                             .per_nm_1_nm = Profile{0.0015}},
@@ -100,9 +96,12 @@ SimulatedMachineConfig default_lathe() {
                       .nominal_feed_m_rev = 0.2e-3,
                       .lag_s = 0.1,
                       .depth_m = Profile{{0.0, 0.0},
-                                         {0.003, 0.0}, {0.003, 1e-3},
-                                         {0.015, 1e-3}, {0.015, 1.5e-3},
-                                         {0.027, 1.5e-3}, {0.027, 0.0}},
+                                         {0.003, 0.0},
+                                         {0.003, 1e-3},
+                                         {0.015, 1e-3},
+                                         {0.015, 1.5e-3},
+                                         {0.027, 1.5e-3},
+                                         {0.027, 0.0}},
                       .diameter_m = Profile{0.05}},
           .feed = {.start_s = 1.5,
                    .feed_m_rev = 0.2e-3,

@@ -24,9 +24,9 @@ Plant::Slope Plant::slope(const MotorFlux& flux, double speed_rad_s,
                           const PlantInput& input) const noexcept {
   Slope result{.motor = motor_.instant(flux, input.voltage_v, speed_rad_s),
                .acceleration_rad_s2 = 0.0};
-  result.acceleration_rad_s2 = (result.motor.torque_nm - input.cut_load_nm -
-                                friction_nm(speed_rad_s, input)) *
-                               inverse_inertia_1_kg_m2_;  // (S10)
+  result.acceleration_rad_s2 =
+      (result.motor.torque_nm - input.cut_load_nm - friction_nm(speed_rad_s, input)) *
+      inverse_inertia_1_kg_m2_;  // (S10)
   return result;
 }
 
@@ -49,14 +49,14 @@ Complex Plant::step(PlantState& state, const PlantInput& input, double step_s) c
     filter(state.filter, input, a.motor.line_current_a, middle, d.motor.line_current_a, step_s);
   }
   state.angle_rad += step_s / 6.0 * (speed + 2.0 * (speed_b + speed_c) + speed_d);
-  state.speed_rad_s = speed + step_s / 6.0 *
-                                  (a.acceleration_rad_s2 + 2.0 * (b.acceleration_rad_s2 +
-                                  c.acceleration_rad_s2) + d.acceleration_rad_s2);
-  state.flux = {
-      flux.stator_vs + step_s * weighted(a.motor.emf_v, b.motor.emf_v, c.motor.emf_v,
-                                         d.motor.emf_v),
-      flux.rotor_vs + step_s * weighted(a.motor.rotor_slope_v, b.motor.rotor_slope_v,
-                                        c.motor.rotor_slope_v, d.motor.rotor_slope_v)};
+  state.speed_rad_s =
+      speed + step_s / 6.0 *
+                  (a.acceleration_rad_s2 + 2.0 * (b.acceleration_rad_s2 + c.acceleration_rad_s2) +
+                   d.acceleration_rad_s2);
+  state.flux = {flux.stator_vs +
+                    step_s * weighted(a.motor.emf_v, b.motor.emf_v, c.motor.emf_v, d.motor.emf_v),
+                flux.rotor_vs + step_s * weighted(a.motor.rotor_slope_v, b.motor.rotor_slope_v,
+                                                  c.motor.rotor_slope_v, d.motor.rotor_slope_v)};
   return charge;
 }
 

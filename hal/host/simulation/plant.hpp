@@ -8,10 +8,10 @@
 namespace cutforce::hal::host {
 
 struct SpindleConfig {
-  double inertia_kg_m2;                  // all that turns, seen from the motor
+  double inertia_kg_m2;  // all that turns, seen from the motor
   double coulomb_torque_nm = 0.0;
   double viscous_nm_s_rad = 0.0;
-  double gear_ratio = 1.0;               // motor turns per spindle turn
+  double gear_ratio = 1.0;  // motor turns per spindle turn
 };
 
 // Equal second-order Butterworth filters on voltage and current, as space vectors.
@@ -32,8 +32,8 @@ struct PlantState {
 // Constant between two events.
 struct PlantInput {
   Complex voltage_v;
-  double cut_load_nm = 0.0;       // cutting torque and the friction it causes
-  double friction_ratio = 1.0;    // of Coulomb and viscous friction against the configured
+  double cut_load_nm = 0.0;     // cutting torque and the friction it causes
+  double friction_ratio = 1.0;  // of Coulomb and viscous friction against the configured
 };
 
 class Plant {

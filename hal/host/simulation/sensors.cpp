@@ -39,8 +39,8 @@ double SpeedSensor::read(double speed_rad_s, double angle_rad) noexcept {
   const auto [sine, cosine] = ripples ? sine_cosine(angle_rad) : SineCosine{0.0, 1.0};
   double measured = speed_rad_s;
   if (config_.encoder_counts > 0.0) {
-    const double seen_rad = angle_rad + config_.ripple_ratio * sine +
-                            config_.second_ripple_ratio * sine * cosine;
+    const double seen_rad =
+        angle_rad + config_.ripple_ratio * sine + config_.second_ripple_ratio * sine * cosine;
     const double count = std::floor(seen_rad * config_.encoder_counts / kTwoPi);
     measured = (count - counts_.push(count)) * kTwoPi / config_.encoder_counts / window_s_;
   } else if (ripples) {

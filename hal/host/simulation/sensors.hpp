@@ -23,9 +23,9 @@ enum class VoltageSignal : std::uint8_t { kMean, kReference, kInstantaneous };
 struct ChannelConfig {
   double gain = 1.0;
   double offset = 0.0;
-  double noise = 0.0;       // standard deviation of one sample
-  double range = 0.0;       // clipped to +-range; 0: unlimited
-  double bits = 0.0;        // steps of 2 range/2^bits; 0: continuous
+  double noise = 0.0;  // standard deviation of one sample
+  double range = 0.0;  // clipped to +-range; 0: unlimited
+  double bits = 0.0;   // steps of 2 range/2^bits; 0: continuous
 };
 
 struct SpeedSensorConfig {
@@ -44,8 +44,8 @@ struct PowerMeterConfig {
   double lag_s = 0.0;
   double scale = 1.0;
   double offset_w = 0.0;
-  double noise_w = 0.0;     // standard deviation of one output value
-  double period_s = 1e-3;   // of its output
+  double noise_w = 0.0;    // standard deviation of one output value
+  double period_s = 1e-3;  // of its output
 };
 
 struct DynamometerConfig {
@@ -62,7 +62,7 @@ struct SensorConfig {
   std::array<ChannelConfig, 3> voltage{};
   std::array<ChannelConfig, 3> current{};
   bool current_w_present = true;
-  double voltage_lead_s = 0.0;   // voltages are sampled this much after the currents
+  double voltage_lead_s = 0.0;  // voltages are sampled this much after the currents
   SpeedSensorConfig speed{};
   PowerMeterConfig power_meter{};
   DynamometerConfig dynamometer{};
@@ -107,7 +107,7 @@ class PowerMeter {
 
  private:
   PowerMeterConfig config_;
-  int periods_;        // of the drive, per output
+  int periods_;  // of the drive, per output
   double lag_share_;
   RandomStream random_;
   DelayLine<double> dead_time_;

@@ -12,12 +12,12 @@
 namespace cutforce::hal::host {
 
 enum class SignalFaultKind : std::uint8_t {
-  kGap,          // samples are not delivered
-  kStuck,        // `channel` repeats its last good value
-  kLost,         // `channel` reads 0
-  kSwapped,      // `channel` and `other` change places
-  kInverted,     // `channel` has the wrong sign
-  kAbsent,       // `channel` is not in the sample
+  kGap,       // samples are not delivered
+  kStuck,     // `channel` repeats its last good value
+  kLost,      // `channel` reads 0
+  kSwapped,   // `channel` and `other` change places
+  kInverted,  // `channel` has the wrong sign
+  kAbsent,    // `channel` is not in the sample
 };
 
 struct SignalFault {

@@ -25,8 +25,8 @@ std::array<Channel, 3> channels(const std::array<ChannelConfig, 3>& c, std::uint
 
 // What every sample carries.
 std::uint32_t presence(const SensorConfig& s) noexcept {
-  std::uint32_t present = bit(Signal::kVoltageU) | bit(Signal::kVoltageV) |
-                          bit(Signal::kVoltageW) | bit(Signal::kCurrentU) | bit(Signal::kCurrentV);
+  std::uint32_t present = bit(Signal::kVoltageU) | bit(Signal::kVoltageV) | bit(Signal::kVoltageW) |
+                          bit(Signal::kCurrentU) | bit(Signal::kCurrentV);
   const auto add = [&present](bool there, Signal signal) {
     if (there) present |= bit(signal);
   };
@@ -164,10 +164,12 @@ void SimulatedMachine::step_cut(double time_s) noexcept {
 
 Complex SimulatedMachine::voltage_signal() const noexcept {
   switch (config_.sensors.voltage_signal) {
-    case VoltageSignal::kReference: return hold_.reference_v;
+    case VoltageSignal::kReference:
+      return hold_.reference_v;
     case VoltageSignal::kInstantaneous:
       return config_.inverter.anti_alias_hz > 0.0 ? state_.filter.voltage_v : input_.voltage_v;
-    case VoltageSignal::kMean: break;
+    case VoltageSignal::kMean:
+      break;
   }
   // Half a hold to either side; the hold to come is known, for the drive has computed it, (S15).
   const double share =
@@ -194,12 +196,11 @@ void SimulatedMachine::read_currents_and_rest() noexcept {
   sample_.time_ns = now_ns_;
   for (std::size_t k = 0; k < 3; ++k) {
     const double current_a = current_channel_[k].read(phase_a[k]);
-    sample_.current_a[k] = k < 2 || config_.sensors.current_w_present
-                               ? static_cast<float>(current_a) : 0.0F;
+    sample_.current_a[k] =
+        k < 2 || config_.sensors.current_w_present ? static_cast<float>(current_a) : 0.0F;
   }
   const auto& feed = feed_.state();
-  const bool cutting_move =
-      feed.feeding && feed.position_m >= config_.feed.cutting_move_start_m;
+  const bool cutting_move = feed.feeding && feed.position_m >= config_.feed.cutting_move_start_m;
   sample_.present = present_;
   const auto put = [this](Signal signal, double value) {
     value_of(sample_, signal) = sample_.has(signal) ? static_cast<float>(value) : 0.0F;

@@ -20,18 +20,18 @@ namespace cutforce::hal::host {
 struct MachineTruth {
   std::int64_t time_ns;
   double airgap_torque_nm;
-  double load_torque_nm;      // all that loads the motor: cut, friction; not inertia
-  double cutting_torque_nm;   // at the motor
+  double load_torque_nm;     // all that loads the motor: cut, friction; not inertia
+  double cutting_torque_nm;  // at the motor
   double cutting_force_n;
-  double speed_rad_s;         // motor shaft
+  double speed_rad_s;  // motor shaft
   double feed_m_s;
   double depth_m;
   double position_m;
   double diameter_m;
-  double override_pct;        // in effect
-  double input_power_w;       // into the motor, mean of the last hold
+  double override_pct;   // in effect
+  double input_power_w;  // into the motor, mean of the last hold
   double stator_resistance_ohm;
-  double slip_speed_rad_s;    // electrical: rotor flux against rotor
+  double slip_speed_rad_s;  // electrical: rotor flux against rotor
 };
 
 class SimulatedMachine {
@@ -92,12 +92,12 @@ class SimulatedMachine {
   std::uint32_t present_;
 
   Hold before_{}, hold_{}, after_{};
-  double energy_j_ = 0.0;     // into the motor since the hold began
+  double energy_j_ = 0.0;  // into the motor since the hold began
   double power_w_ = 0.0;
   std::int64_t now_ns_ = 0;
   std::int64_t hold_begin_ns_ = 0;
   std::int64_t next_control_ns_ = 0;
-  std::int64_t index_ = 0;    // of the sample in the making
+  std::int64_t index_ = 0;  // of the sample in the making
   bool has_voltages_ = false;
   bool has_rest_ = false;
   Sample sample_{};
