@@ -272,8 +272,9 @@ TEST(ControlLoop, NeverLetsTheFeedRiseOnAFaultInTheCut) {
         Case{"a voltage is lost", SignalFaultKind::kLost, Signal::kVoltageU},
         Case{"a current is stuck", SignalFaultKind::kStuck, Signal::kCurrentU},
         Case{"a voltage is stuck", SignalFaultKind::kStuck, Signal::kVoltageW},
-        // Only reactive power and time tell (signal_health.hpp).
-        Case{"a current is inverted", SignalFaultKind::kInverted, Signal::kCurrentU, 1.5}}) {
+        // Only a second of reactive power at a steady frequency tells (signal_health.hpp), and the
+        // frequency takes about half a second to settle on what the bad current leaves of it.
+        Case{"a current is inverted", SignalFaultKind::kInverted, Signal::kCurrentU, 2.0}}) {
     for (const EstimatorName estimator : {EstimatorName::kFused, EstimatorName::kSynthesized}) {
       SCOPED_TRACE(std::string(c.what) + ", estimator " +
                    std::to_string(static_cast<int>(estimator)));

@@ -63,8 +63,8 @@ TEST(ControlLoop, HoldsTheTrueForceAtItsReference) {
 // by 2.4 % still: the force held is that much too low. Bounded on both sides.
 TEST(ControlLoop, HoldsTheSynthesizedForceLessItsOwnErrors) {
   using enum firmware::SpeedSource;
-  EXPECT_NEAR(settled_true_force_n(EstimatorName::kSynthesized, kSynchronous), 488.0, 5.0);
-  EXPECT_NEAR(settled_true_force_n(EstimatorName::kSynthesized, kRotor), 475.0, 5.0);
+  EXPECT_NEAR(settled_true_force_n(EstimatorName::kSynthesized, kSynchronous), 483.0, 5.0);
+  EXPECT_NEAR(settled_true_force_n(EstimatorName::kSynthesized, kRotor), 470.0, 5.0);
 }
 
 // F = T n / (D/2), with a diameter that changes from sample to sample, as in facing.
