@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "estimator/polynomials.hpp"
+
 namespace cutforce::estimator {
 namespace {
 
@@ -23,8 +25,6 @@ constexpr float kLargestThreshold_ratio = 0.06F;
 constexpr float kAging_ratio_sqrt_s = 5e-4F;  // friction drifts between tare and cut
 constexpr float kUnknownFriction_ratio = 0.05F;
 constexpr float kReturn_ratio = 0.05F;  // believed as idle after a change of speed
-
-float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
 
 }  // namespace
 

@@ -26,14 +26,13 @@ auto FluxTorque::make(const Config& config) noexcept -> std::expected<FluxTorque
 
 auto FluxTorque::coefficients(float frequency_rad_s, float period_s) const noexcept
     -> Coefficients {
-  const float magnitude = frequency_rad_s < 0.0F ? -frequency_rad_s : frequency_rad_s;
-  const float acting = magnitude > kSlowestLeak_rad_s ? magnitude : kSlowestLeak_rad_s;
+  const float size = magnitude(frequency_rad_s);
+  const float acting = size > kSlowestLeak_rad_s ? size : kSlowestLeak_rad_s;
   const float leaked = config_.leak_ratio * acting * period_s;
   const float a = leaked < 0.5F ? 1.0F - leaked : 0.5F;
   const float half_angle = 0.5F * frequency_rad_s * period_s;
   const float t_over_w = 0.5F * period_s * tan_over_x(half_angle);  // t / w_e
-  const float leak_over_w =
-      magnitude > kSmallestFrequency_rad_s ? (1.0F - a) / frequency_rad_s : 0.0F;
+  const float leak_over_w = size > kSmallestFrequency_rad_s ? (1.0F - a) / frequency_rad_s : 0.0F;
   return {.leak = a, .gain_s = {0.5F * t_over_w * (1.0F + a), -0.5F * leak_over_w}};  // (E64)
 }
 
@@ -90,8 +89,8 @@ void FluxTorque::step(const MotorSample& sample, float elapsed_periods) noexcept
 
 void FluxTorque::seed() noexcept {
   const float w = state_.frequency_rad_s;
-  const float magnitude = w < 0.0F ? -w : w;
-  if (!(magnitude > kSmallestFrequency_rad_s)) return;
+  const float size = magnitude(w);
+  if (!(size > kSmallestFrequency_rad_s)) return;
   state_.flux_v_s = {state_.emf_v.beta / w, -state_.emf_v.alpha / w};  // e / (j w_e)
 }
 

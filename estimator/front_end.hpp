@@ -20,6 +20,7 @@
 #include <expected>
 #include <type_traits>
 
+#include "estimator/polynomials.hpp"
 #include "estimator/space_vector.hpp"
 
 namespace cutforce::estimator {
@@ -141,7 +142,7 @@ constexpr std::expected<void, FrontEnd::ConfigError> FrontEnd::check_calibration
   constexpr float kMost = 1e6F;  // beyond any sensor; products stay far from overflow
   // A sensor that is mounted the wrong way round has a negative gain.
   const auto gain = [](float g) {
-    const float size = g < 0.0F ? -g : g;
+    const float size = magnitude(g);
     return size > 1.0F / kMost && size < kMost;
   };
   const auto offset = [](float o) { return o > -kMost && o < kMost; };

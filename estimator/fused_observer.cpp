@@ -21,8 +21,6 @@ constexpr float kEvenTurns = 1.5F;
 constexpr float kUncalibrated_ratio = 0.03F;
 constexpr float kTareFollow_ratio = 0.02F;  // of what the tare belongs to, each tick
 
-float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
-
 }  // namespace
 
 FusedObserver::FusedObserver(const Config& config) noexcept

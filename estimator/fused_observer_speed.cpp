@@ -11,8 +11,6 @@ constexpr float kTwoPi = 6.28318530718F;
 constexpr float kFrequencyTime_s = 0.015F;
 constexpr float kLowestFrequency_rad_s = kTwoPi * 3.0F;
 
-float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
-
 // Turned angle; of the angles that look the same, the one nearest to what is expected.
 float rotated(SpaceVector now, SpaceVector before, float expected_rad) noexcept {
   const float angle = angle_of(dot(now, before), cross(now, before));

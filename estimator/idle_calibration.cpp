@@ -36,8 +36,8 @@ bool sum_rule(const Phasor& u, const Phasor& v, const Phasor& w, float limit,
               float* gains) noexcept {
   const float det = u.re * v.im - v.re * u.im;
   const float size = (u.re * u.re + u.im * u.im) + (v.re * v.re + v.im * v.im);
-  const float magnitude = det < 0.0F ? -det : det;
-  if (!(magnitude > 0.1F * size)) return false;  // the phasors do not span the plane
+  const float area = magnitude(det);
+  if (!(area > 0.1F * size)) return false;  // the phasors do not span the plane
   const float gu = -(w.re * v.im - v.re * w.im) / det;
   const float gv = -(u.re * w.im - w.re * u.im) / det;
   const float mean = (gu + gv + 1.0F) / 3.0F;
@@ -59,7 +59,7 @@ auto IdleCalibration::make(const Config& config) noexcept
 
 void IdleCalibration::open(float frequency_rad_s, float at_least_s) noexcept {
   state_ = State{};
-  const float w = frequency_rad_s < 0.0F ? -frequency_rad_s : frequency_rad_s;
+  const float w = magnitude(frequency_rad_s);
   if (!(w > 1.0F)) return;
   const float period_s = kTwoPi / w;
   const float wished_s = at_least_s > config_.shortest_s ? at_least_s : config_.shortest_s;

@@ -11,6 +11,7 @@
 #include <expected>
 #include <type_traits>
 
+#include "estimator/polynomials.hpp"
 #include "estimator/speed_table.hpp"
 
 namespace cutforce::estimator {
@@ -19,17 +20,17 @@ namespace cutforce::estimator {
 template <class Real>
 [[nodiscard]] Real torque_without_load_friction(Real torque, Real linear, Real quadratic) noexcept {
   const Real one_plus = Real{1} + linear;
-  const Real magnitude = torque < Real{0} ? -torque : torque;
+  const Real size = torque < Real{0} ? -torque : torque;
   return Real{2} * torque /
-         (one_plus + std::sqrt(one_plus * one_plus + Real{4} * quadratic * magnitude));
+         (one_plus + std::sqrt(one_plus * one_plus + Real{4} * quadratic * size));
 }
 
 // (E33), the other way round: for simulation and tests.
 template <class Real>
 [[nodiscard]] constexpr Real torque_with_load_friction(Real torque, Real linear,
                                                        Real quadratic) noexcept {
-  const Real magnitude = torque < Real{0} ? -torque : torque;
-  return torque * (Real{1} + linear + quadratic * magnitude);
+  const Real size = torque < Real{0} ? -torque : torque;
+  return torque * (Real{1} + linear + quadratic * size);
 }
 
 class LoadFriction {
@@ -75,9 +76,9 @@ class LoadFriction {
     const float f = config_.linear_ratio.at(input.speed_rad_s);
     const float g = config_.quadratic_1_nm.at(input.speed_rad_s);
     const float cutting = torque_without_load_friction(input.torque_nm, f, g);
-    const float magnitude = cutting < 0.0F ? -cutting : cutting;
+    const float size = magnitude(cutting);
     return {.cutting_torque_nm = cutting,
-            .sensitivity_ratio = 1.0F / (1.0F + f + 2.0F * g * magnitude)};  // (E35)
+            .sensitivity_ratio = 1.0F / (1.0F + f + 2.0F * g * size)};  // (E35)
   }
 
  private:

@@ -1,5 +1,7 @@
 #include "estimator/noise_meter.hpp"
 
+#include "estimator/polynomials.hpp"
+
 namespace cutforce::estimator {
 namespace {
 
@@ -19,8 +21,6 @@ constexpr float kSlowestBeat = 0.03F;
 constexpr std::uint32_t kSureQuantised = 60;
 constexpr float kFirstSpeed_rad_s = 0.03F;
 constexpr float kFirstTorque_ratio = 0.02F;
-
-float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
 
 }  // namespace
 

@@ -9,6 +9,8 @@
 
 namespace cutforce::estimator {
 
+[[nodiscard]] constexpr float magnitude(float x) noexcept { return __builtin_fabsf(x); }
+
 // |error| <= 1.2e-7 rad for |x| <= tan(pi/8); (E50).
 [[nodiscard]] constexpr float atan_small(float x) noexcept {
   const float z = x * x;
@@ -21,8 +23,8 @@ namespace cutforce::estimator {
 // Angle of (x, y) in (-pi, pi]; 0 for the null vector. |error| <= 4e-7 rad.
 [[nodiscard]] constexpr float angle_of(float x, float y) noexcept {
   constexpr float kPi = 3.14159265358979F;
-  const float ax = x < 0.0F ? -x : x;
-  const float ay = y < 0.0F ? -y : y;
+  const float ax = magnitude(x);
+  const float ay = magnitude(y);
   const float high = ax > ay ? ax : ay;
   const float low = ax > ay ? ay : ax;
   if (!(high > 0.0F)) return 0.0F;

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "estimator/polynomials.hpp"
+
 namespace cutforce::estimator {
 namespace {
 
@@ -55,7 +57,7 @@ void RunUpInertia::step(const Input& in) noexcept {
 
 void RunUpInertia::close(float tare_nm) noexcept {
   State& s = state_;
-  const float gained = s.gained_rad_s < 0.0F ? -s.gained_rad_s : s.gained_rad_s;
+  const float gained = magnitude(s.gained_rad_s);
   if (!(gained > 0.0F && s.time_s > 0.0F)) return;
   const float seen = (s.impulse_nm_s - tare_nm * s.time_s) / s.gained_rad_s;  // (E115)
   const float from_tare = kTareError_ratio * config_.rated_torque_nm * s.time_s / gained;

@@ -2,14 +2,14 @@
 
 #include <cstddef>
 
+#include "estimator/polynomials.hpp"
+
 namespace cutforce::estimator {
 namespace {
 
 using Triple = std::array<float, 3>;
 
 constexpr float kInfinity = __builtin_huge_valf();
-
-constexpr float magnitude(float x) noexcept { return __builtin_fabsf(x); }
 
 // Finite but beyond the range, or no number at all.
 constexpr Fault named(float x) noexcept {

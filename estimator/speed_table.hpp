@@ -4,6 +4,8 @@
 
 #include <array>
 
+#include "estimator/polynomials.hpp"
+
 namespace cutforce::estimator {
 
 struct SpeedTable {
@@ -16,7 +18,7 @@ struct SpeedTable {
   }
 
   [[nodiscard]] constexpr float at(float speed) const noexcept {
-    const float w = speed < 0.0F ? -speed : speed;
+    const float w = magnitude(speed);
     if (!(w > speed_rad_s[0])) return value[0];
     if (w >= speed_rad_s[2]) return value[2];
     const std::size_t k = w < speed_rad_s[1] ? 0 : 1;

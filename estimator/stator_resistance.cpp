@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "estimator/polynomials.hpp"
+
 namespace cutforce::estimator {
 namespace {
 
@@ -36,11 +38,9 @@ auto StatorResistance::make(const Config& config) noexcept
 void StatorResistance::step(const Input& in) noexcept {
   auto& s = state_.sums;
   // The copper term of the idle must stand out of what the iron loss may be.
-  const float speed_ratio = (in.frequency_rad_s < 0.0F ? -in.frequency_rad_s : in.frequency_rad_s) /
-                            config_.rated_frequency_rad_s;
-  const float copper =
-      config_.resistance_sigma_ratio * config_.stator_resistance_ohm *
-      (in.idle_copper_nm_ohm < 0.0F ? -in.idle_copper_nm_ohm : in.idle_copper_nm_ohm);
+  const float speed_ratio = magnitude(in.frequency_rad_s) / config_.rated_frequency_rad_s;
+  const float copper = config_.resistance_sigma_ratio * config_.stator_resistance_ohm *
+                       magnitude(in.idle_copper_nm_ohm);
   if (!(copper > kStandsOut_sigmas * config_.iron_torque_sigma_nm * speed_ratio)) {
     s.fill(0.0F);
     state_.blocks = 0;
@@ -80,7 +80,7 @@ void StatorResistance::learn() noexcept {
   const float y = flux2 * s[1] / s[5];
   const float a = state_.mean[0];
   const float slip_noise = flux2 * kSlipNoise_rad_s;
-  const float model = kModelError_ratio * a * (torque < 0.0F ? -torque : torque);
+  const float model = kModelError_ratio * a * magnitude(torque);
   const std::array<float, 3> h{torque, -x, -speed_ratio};  // (E110)
   const float r = y - (h[0] * state_.mean[0] + h[1] * state_.mean[1] + h[2] * state_.mean[2]);
   if (state_.blocks++ == 0) {

@@ -48,7 +48,7 @@ auto SynchronousSpeed::close_window() noexcept -> Output {
   const float count = static_cast<float>(config_.samples_per_window);
   const float end_count = static_cast<float>(end_samples_);
   const float electrical = state_.angle_rad / (count * config_.sample_period_s);  // (E26)
-  const float amount = electrical < 0.0F ? -electrical : electrical;
+  const float amount = magnitude(electrical);
   const bool valid =
       amount >= config_.minimum_electrical_rad_s &&
       state_.current_square_a2 >= count * config_.minimum_current_a * config_.minimum_current_a;

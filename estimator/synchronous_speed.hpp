@@ -5,7 +5,7 @@
 //   psi' = v - R_s i - lambda psi (trapezoidal rule),  psi_R = psi - L_sigma i  (E28)
 // whose angle does not jump with the load. The leak lambda forgets the starting value; it turns
 // and shrinks a steady flux, which does not change its rotation, and the shrinkage is undone in
-// the published magnitude.
+// the published size.
 // From slip instead, with the rotor's resistance R_R and the rotor speed w_M:
 //   w_s = (w_M + sqrt(w_M^2 + 4 k P_g))/2,  k = 2 R_R/(3 p^2 |psi_R|^2)         (E29)
 // All quantities star-equivalent, inverse-Gamma model (R_R, L_sigma on the stator side).
@@ -17,6 +17,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "estimator/polynomials.hpp"
 #include "estimator/space_vector.hpp"
 
 namespace cutforce::estimator {
@@ -27,10 +28,10 @@ namespace cutforce::estimator {
                                                        float airgap_power_w,
                                                        float rotor_resistance_ohm, float pole_pairs,
                                                        float flux_square_v2s2) noexcept {
-  const float magnitude = rotor_speed_rad_s < 0.0F ? -rotor_speed_rad_s : rotor_speed_rad_s;
+  const float size = magnitude(rotor_speed_rad_s);
   const float k = rotor_resistance_ohm / (1.5F * pole_pairs * pole_pairs * flux_square_v2s2);
-  const float under = magnitude * magnitude + 4.0F * k * airgap_power_w;
-  const float speed = 0.5F * (magnitude + std::sqrt(under > 0.0F ? under : 0.0F));
+  const float under = size * size + 4.0F * k * airgap_power_w;
+  const float speed = 0.5F * (size + std::sqrt(under > 0.0F ? under : 0.0F));
   return rotor_speed_rad_s < 0.0F ? -speed : speed;
 }
 

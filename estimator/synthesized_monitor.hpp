@@ -13,6 +13,8 @@
 #include <expected>
 #include <type_traits>
 
+#include "estimator/polynomials.hpp"
+
 namespace cutforce::estimator {
 
 class SynthesizedMonitor {
@@ -70,8 +72,7 @@ class SynthesizedMonitor {
   }
 
   [[nodiscard]] constexpr Output step(const Input& input) noexcept {
-    const float amount =
-        input.measured_power_w < 0.0F ? -input.measured_power_w : input.measured_power_w;
+    const float amount = magnitude(input.measured_power_w);
     const float below = amount > config_.power_floor_w ? amount : config_.power_floor_w;
     const float ratio = (input.computed_power_w - input.measured_power_w) / below;  // (E40)
     const bool excess = ratio > config_.threshold_ratio ||

@@ -33,12 +33,11 @@ void ControlLoop::watch_health(LoopOutput& out) noexcept {
                     .speed_present = own_.speed_present != 0});
   out.faults = own_.faults | health.faults;
   own_.faults = {};
-  const float magnitude =
-      own_.frequency_rad_s < 0.0F ? -own_.frequency_rad_s : own_.frequency_rad_s;
+  const float frequency_rad_s = estimator::magnitude(own_.frequency_rad_s);
   if (impossible(out.faults)) {
     own_.turning_s = 0.0F;
     out.state = LoopState::kRefused;
-  } else if (magnitude > kTurning_rad_s && own_.turning_s < kProof_s) {
+  } else if (frequency_rad_s > kTurning_rad_s && own_.turning_s < kProof_s) {
     own_.turning_s += config_.health.tick_period_s;
   }
 }
@@ -156,7 +155,7 @@ float ControlLoop::path_frequency_rad_s() const noexcept {
   const float synchronous = valid ? own_.path.synchronous_rad_s * pole_pairs : 0.0F;
   if (own_.speed_present == 0) return synchronous;
   const float shaft = own_.speed_rad_s * pole_pairs;
-  const float size = shaft < 0.0F ? -shaft : shaft;
+  const float size = estimator::magnitude(shaft);
   const float apart = synchronous - shaft;
   const bool agree = apart <= kSlipMost_ratio * size && apart >= -kSlipMost_ratio * size;
   return valid && (agree || size < kTurning_rad_s) ? synchronous : shaft;
