@@ -171,9 +171,11 @@ TEST(Stopping, LeavesNothingBehind) {
   const ScratchFolder folder;
   const auto scenario = folder.write("long.toml", "duration_s = 30000\n");
   for (const std::string signal : {"INT", "TERM"}) {
-    const auto result = run_command("timeout --preserve-status --signal=" + signal + " 0.5 " +
-                                    quoted(CUTFORCE_PROGRAM) + " simulate " + q(scenario) +
-                                    " --out " + q(folder.file("out")) + " 2>&1");
+    // In the background timeout signals the child and then its group: a second signal means at
+    // once.
+    const auto result = run_command("timeout --foreground --preserve-status --signal=" + signal +
+                                    " 0.5 " + quoted(CUTFORCE_PROGRAM) + " simulate " +
+                                    q(scenario) + " --out " + q(folder.file("out")) + " 2>&1");
     EXPECT_EQ(result.exit_status, signal == "INT" ? 130 : 143) << result.output;
     EXPECT_EQ(folder.file_count(), 1U);
   }
