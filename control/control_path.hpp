@@ -7,8 +7,9 @@
 //   not enabled, or no good estimate since the start     the neutral value; not controlling
 //   the estimate is lost                                 falls to min(fallback, last), never up
 //   the estimate is held                                 stays
-//   air                                                  the approach value
-//   exit not confirmed, or the force falls steeply       stays
+//   air                                                  the approach value, or less if the law
+//                                                        foresees less
+//   exit not confirmed, or the force falls steeply       stays, or falls if the law foresees it
 //   entry, cut                                           the law
 // Every change goes through limits, slew and rounding, so that taking over and giving back are
 // free of jumps; the law follows what was sent while another line decides (law.hpp). While the
@@ -97,9 +98,11 @@ class BasicControlPath {
     float force_sigma_n;
     std::uint32_t force_age_ticks;  // control ticks since the estimate was made; 0: this tick's
     float override_reported_pct;
+    float spindle_ratio;     // spindle speed over the programmed one; 1 where not known
     bool force_valid;        // false: there is no estimate
     bool override_reported;  // false: the CNC tells nothing
     bool enable;
+    bool part_start;  // the program of a part starts
   };
 
   struct Output {
@@ -115,6 +118,7 @@ class BasicControlPath {
     ForceRefusal refusal;
     std::uint32_t limits;  // set of OverrideLimit
     float wanted_pct;      // before limits, slew and rounding
+    LawOutput law;         // with what it publishes of the process
   };
 
   struct State {
@@ -153,10 +157,14 @@ class BasicControlPath {
                                 .force_sigma_n = force.force_sigma_n,
                                 .override_applied_pct = applied.applied_pct,
                                 .override_tolerance_pct = feed_override_.tolerance_pct(),
+                                .spindle_ratio = input.spindle_ratio,
                                 .phase = cut.phase,
-                                .mode = decision.mode});
-    const float wanted_pct =
-        decision.mode == LawMode::kActive ? law.override_pct : decision.wanted_pct;
+                                .mode = decision.mode,
+                                .part_start = input.part_start});
+    // In the air, and while the cut may be over, the law's answer is an upper bound.
+    const float wanted_pct = decision.mode == LawMode::kActive
+                                 ? std::min(law.override_pct, decision.wanted_pct)
+                                 : decision.wanted_pct;
     const auto sent =
         feed_override_.step({.wanted_pct = wanted_pct, .may_rise = decision.may_rise});
     return {.override_pct = sent.override_pct,
@@ -170,7 +178,8 @@ class BasicControlPath {
             .force = force.outcome,
             .refusal = force.refusal,
             .limits = sent.limits,
-            .wanted_pct = wanted_pct};
+            .wanted_pct = wanted_pct,
+            .law = law};
   }
 
   [[nodiscard]] constexpr State state() const noexcept {
@@ -193,6 +202,8 @@ class BasicControlPath {
   }
 
  private:
+  static constexpr float kHighest_pct = 1e6F;  // no bound; a law that is not finite stays visible
+
   struct Decision {
     float wanted_pct;
     LawMode mode;
@@ -241,21 +252,20 @@ class BasicControlPath {
       return fall;
     }
     if (!fresh) return stay;
+    constexpr auto kLaw = LawMode::kActive;
     switch (cut.phase) {
       case CutPhase::kAir:
         return {.wanted_pct = approach_pct_,
-                .mode = LawMode::kTrack,
+                .mode = kForesees<L> ? kLaw : LawMode::kTrack,
                 .may_rise = true,
                 .controlling = true};
       case CutPhase::kEntry:
       case CutPhase::kCut:
-        if (cut.falling) return stay;
-        return {.wanted_pct = sent_pct,
-                .mode = LawMode::kActive,
-                .may_rise = true,
-                .controlling = true};
+        if (cut.falling && !kForesees<L>) return stay;
+        return {.wanted_pct = kHighest_pct, .mode = kLaw, .may_rise = true, .controlling = true};
       case CutPhase::kExit:
-        return stay;
+        if (!kForesees<L>) return stay;
+        return {.wanted_pct = sent_pct, .mode = kLaw, .may_rise = false, .controlling = true};
     }
     return stay;
   }

@@ -29,12 +29,36 @@ struct LawInput {
   float force_sigma_n;           // finite and >= 0
   float override_applied_pct;    // acted over the interval that produced force_n
   float override_tolerance_pct;  // a wanted override this close to the applied one was only rounded
+  float spindle_ratio;           // spindle speed over the programmed one; 1 where not known
   CutPhase phase;
   LawMode mode;
+  bool part_start;  // the program of a part, or a repeated block of it, starts with this tick
 };
 
 struct LawOutput {
   float override_pct;  // wanted, before limits, slew and rounding; the applied one unless kActive
+  // What a law that estimates the process publishes of it; 0 where it does not.
+  float process_gain_n_pct;        // force over override, static
+  float process_gain_sigma_ratio;  // standard deviation of that, relative
+  float stability_margin_ratio;    // the process gain may be this many times the estimated one
+};
+
+// The answer of a law that estimates nothing.
+[[nodiscard]] constexpr LawOutput law_answer(float override_pct) noexcept {
+  return {.override_pct = override_pct,
+          .process_gain_n_pct = 0.0F,
+          .process_gain_sigma_ratio = 0.0F,
+          .stability_margin_ratio = 0.0F};
+}
+
+// A law that predicts the force from the override it sent says so with
+// `static constexpr bool kForesees = true`. It is asked in the air too, where its answer is an
+// upper bound of the approach, and while the force falls or the cut may be over, where its answer
+// may only lower; it knows which fall is its own doing, and must itself not rise after one that is
+// not. For any other law a steep fall is taken for a broken tool (cut_state.hpp).
+template <class L>
+inline constexpr bool kForesees = requires {
+  requires L::kForesees;
 };
 
 template <class L>

@@ -79,7 +79,7 @@ class PiController {
       case LawMode::kActive:
         state_.wanted_pct = std::clamp(wanted_pct(base_pct, error_n), -kFarPct, kFarPct);
         state_.error_n = error_n;
-        return {.override_pct = state_.wanted_pct};
+        return law_answer(state_.wanted_pct);
       case LawMode::kTrack:
         state_.error_n = error_n;
         break;
@@ -88,7 +88,7 @@ class PiController {
     }
     // Following: P1 (4) from here with E(i-1) = E(i) moves by the integral part alone.
     state_.wanted_pct = base_pct;
-    return {.override_pct = input.override_applied_pct};
+    return law_answer(input.override_applied_pct);
   }
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }

@@ -186,9 +186,11 @@ void ControlLoop::control_tick(LoopOutput& out) noexcept {
                                             .force_sigma_n = own_.force_sigma_n / count,
                                             .force_age_ticks = 0,
                                             .override_reported_pct = own_.override_reported_pct,
+                                            .spindle_ratio = 1.0F,
                                             .force_valid = valid,
                                             .override_reported = own_.override_reported != 0,
-                                            .enable = config_.control && own_.enabled != 0});
+                                            .enable = config_.control && own_.enabled != 0,
+                                            .part_start = false});
   command_ = {.time_ns = own_.time_ns,
               .override_pct = controlled.override_pct,
               .override_code = controlled.override_code,

@@ -70,9 +70,11 @@ constexpr ControlPath::Input at(double force_n) {
           .force_sigma_n = 5.0F,
           .force_age_ticks = 0,
           .override_reported_pct = 0.0F,
+          .spindle_ratio = 1.0F,
           .force_valid = true,
           .override_reported = false,
-          .enable = true};
+          .enable = true,
+          .part_start = false};
 }
 
 ControlPath::Input lost(ControlPath::Input input) {

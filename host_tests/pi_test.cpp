@@ -33,8 +33,10 @@ constexpr LawInput active(float force_n, float applied_pct) {
           .force_sigma_n = 5.0F,
           .override_applied_pct = applied_pct,
           .override_tolerance_pct = 0.5F,
+          .spindle_ratio = 1.0F,
           .phase = CutPhase::kCut,
-          .mode = LawMode::kActive};
+          .mode = LawMode::kActive,
+          .part_start = false};
 }
 
 // The compiler closes the loop on the discrete plant F(i+1) = a F(i) + (1 - a) k U(i-1) with

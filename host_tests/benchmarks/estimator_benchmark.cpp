@@ -173,9 +173,11 @@ const Body kControlTick{
                                         .force_sigma_n = 5.0F,
                                         .force_age_ticks = 0,
                                         .override_reported_pct = 100.0F,
+                                        .spindle_ratio = 1.0F,
                                         .force_valid = true,
                                         .override_reported = true,
-                                        .enable = true};
+                                        .enable = true,
+                                        .part_start = false};
       return [path, input]() mutable {
         forget(input);
         keep(path.step(input));
