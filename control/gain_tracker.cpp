@@ -19,6 +19,8 @@ constexpr float kTwiceThreshold_ratio = 0.81F;  // two readings in a row need th
 constexpr float kJump_ratio = 1.0F;     // spread of a jump, of the gain
 constexpr float kEntry_variance = 2.0F;  // of the first gain, of the square of the remembered one
 constexpr float kSettled_ratio = 0.1F;   // spread of a gain that is remembered
+constexpr float kBeginSpread_ratio = 0.2F;
+constexpr float kLeastFeed = 0.01F;
 constexpr float kNothing = 0.01F;       // probability that an alarm means nothing
 constexpr float kBadFit = 9.0F;
 constexpr float kBadFitEach = 4.0F;
@@ -41,19 +43,30 @@ GainTracker::GainTracker(const Config& config) noexcept
                               config.sensor_lag_s);
   }
   state_.memory_n = config.gain_n;
-  settle_in(true);
+  settle_in_air();
 }
 
-// Into the air with the last gain remembered, or out of it with that gain.
-void GainTracker::settle_in(bool air) noexcept {
+// Out of the cut: the last gain is remembered.
+void GainTracker::settle_in_air() noexcept {
   State& s = state_;
-  s.air = air ? 1U : 0U;
-  s.gain_n = air ? 0.0F : s.memory_n;
+  s.air = 1;
+  s.gain_n = 0.0F;
   s.covariance = {};
   s.covariance[kSS] = square(config_.noise_n);
-  s.covariance[kKK] = air ? 0.0F : square(0.3F * s.gain_n);
   s.correlation = 0.0F;
   s.power = 1.0F;
+}
+
+// The first reading of all: as if the force had been this for long.
+void GainTracker::begin(const Input& input) noexcept {
+  State& s = state_;
+  s.started = 1;
+  if (!(input.reading_n > input.entry_n && input.feed > kLeastFeed)) return;
+  s.air = 0;
+  s.force_n = s.sensed_n = input.reading_n;
+  s.gain_n = input.reading_n / input.feed;
+  s.covariance[kKK] = square(kBeginSpread_ratio * s.gain_n);
+  s.covariance[kFF] = square(kBeginSpread_ratio * s.force_n);
 }
 
 void GainTracker::predict(float feed, float drift) noexcept {  // (C76), (C77)
@@ -194,8 +207,9 @@ void GainTracker::coast(float feed) noexcept {
 
 auto GainTracker::step(const Input& input) noexcept -> Output {
   State& s = state_;
-  const bool air = input.air && s.samples == 0;
-  if (air != (s.air != 0) && s.samples == 0) settle_in(air);
+  if (s.started == 0) begin(input);
+  if (input.air && s.air == 0 && s.samples == 0) settle_in_air();
+  const bool air = s.air != 0;
   const Point before{.force_n = s.force_n,
                      .sensed_n = s.sensed_n,
                      .gain_n = s.gain_n,
@@ -230,10 +244,11 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
                        out.innovation * s.last_innovation > 0.0F &&
                        magnitude(s.last_innovation) >
                            kTwiceThreshold_ratio * config_.jump_threshold;
-    const bool entry = air && innovation_n > input.entry_n;
-    if ((size > config_.jump_threshold || again || entry) && s.ticks >= 2 &&
-        (!air || innovation_n > 0.0F)) {
+    const bool surprise = size > config_.jump_threshold || again;
+    const bool entry = air && (!input.air || innovation_n > input.entry_n);
+    if (s.ticks >= 1 && (air ? entry || (surprise && innovation_n > 0.0F) : surprise)) {
       s.rising = innovation_n > 0.0F ? 1U : 0U;
+      s.air = 0;
       begin_jump(input, noise_n2);
       conclude();
       out.jumped = true;
@@ -252,7 +267,7 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
   out.rising = s.rising != 0;
   if (s.samples >= kSamples) s.samples = 0;
   s.past = before;
-  s.ticks = std::min(s.ticks + 1U, 2U);
+  s.ticks = 1;
   out.force_n = std::max(s.force_n, 0.0F);
   out.gain_n = s.gain_n;
   out.gain_sigma_n = std::sqrt(s.covariance[kKK]);

@@ -106,7 +106,8 @@ class GainTracker {
     float prior_mean_n = 0.0F;
     float prior_variance_n2 = 1.0F;
     std::uint32_t samples = 0;  // 0: no jump
-    std::uint32_t ticks = 0;    // since the start, saturating at 2
+    std::uint32_t ticks = 0;    // 1: past holds the tick before
+    std::uint32_t started = 0;
     std::uint32_t rising = 0;
     std::uint32_t air = 1;
   };
@@ -129,7 +130,8 @@ class GainTracker {
   void begin_jump(const Input& input, float variance_n2) noexcept;
   void follow(float feed, float reading_n, float variance_n2, std::uint32_t tick) noexcept;
   void conclude() noexcept;
-  void settle_in(bool air) noexcept;
+  void begin(const Input& input) noexcept;
+  void settle_in_air() noexcept;
 
   Config config_;
   LagStep lag_;

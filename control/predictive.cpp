@@ -25,7 +25,7 @@ constexpr float kKeepFade_s = 1.5F;
 constexpr float kCoarse_ratio = 0.04F;    // of the override: coarser steps are rounded down
 constexpr float kEntry_ratio = 0.05F;     // of the reference: a reading above it ends the air
 constexpr float kLost_ratio = 0.2F;       // of the gain before: less is a lost cut
-constexpr float kLost_s = 0.5F;
+constexpr float kLost_s = 0.5F;          // after which a cut that is left is a light one
 
 }  // namespace
 
@@ -196,7 +196,8 @@ bool Predictive::may_rise(const GainTracker::Output& seen, CutPhase phase) noexc
   if (s.before_jump_n > 0.0F) {
     const bool surely_cutting =
         seen.gain_n - 3.0F * seen.gain_sigma_n > kLost_ratio * s.before_jump_n;
-    if (surely_cutting) s.before_jump_n = 0.0F;
+    const bool light_cut = phase == CutPhase::kCut && s.since_jump_s > kLost_s;
+    if (surely_cutting || light_cut) s.before_jump_n = 0.0F;
   }
   return s.before_jump_n <= 0.0F && !(seen.jumped && seen.rising);
 }
