@@ -69,7 +69,7 @@ void GainTracker::begin(const Input& input) noexcept {
   s.covariance[kFF] = square(kBeginSpread_ratio * s.force_n);
 }
 
-void GainTracker::predict(float feed, float drift) noexcept {  // (C76), (C77)
+void GainTracker::predict(float feed, float feed_sigma, float drift) noexcept {  // (C76), (C77)
   State& s = state_;
   const float drive = s.gain_n * feed;
   s.sensed_n = lag_.sensed * s.sensed_n + lag_.sensed_force * s.force_n + lag_.sensed_input * drive;
@@ -92,6 +92,12 @@ void GainTracker::predict(float feed, float drift) noexcept {  // (C76), (C77)
   s.covariance[kSS] = sf * s_f + ss * s_s + sk * s_k;
   s.covariance[kSK] = s_k;
   s.covariance[kKK] = p[kKK] + square(drift * s.gain_n);
+  // An unknown moment moves force and reading together.
+  const float force_n = (1.0F - lag_.cut) * s.gain_n * feed_sigma;
+  const float sensed_n = lag_.sensed_input * s.gain_n * feed_sigma;
+  s.covariance[kFF] += force_n * force_n;
+  s.covariance[kFs] += force_n * sensed_n;
+  s.covariance[kSS] += sensed_n * sensed_n;
 }
 
 void GainTracker::correct(float innovation_n, float variance_n2) noexcept {  // (C78)
@@ -108,9 +114,13 @@ void GainTracker::correct(float innovation_n, float variance_n2) noexcept {  // 
 }
 
 // The base and each moment's response go one tick on, and the reading is weighed. (C79), (C80)
-void GainTracker::follow(float feed, float reading_n, float variance_n2,
+void GainTracker::follow(float feed, float feed_sigma, float reading_n, float noise_n2,
                          std::uint32_t tick) noexcept {
   State& s = state_;
+  // What an unknown moment did to the force is still there when the next readings come.
+  s.timing_n2 = square(lag_.cut) * s.timing_n2 +
+                square(lag_.sensed_input * std::max(s.gain_n, s.base.gain_n) * feed_sigma);
+  const float variance_n2 = noise_n2 + s.timing_n2;
   const float drive = s.base.gain_n * feed;
   s.base.sensed_n = lag_.sensed * s.base.sensed_n + lag_.sensed_force * s.base.force_n +
                     lag_.sensed_input * drive;
@@ -185,7 +195,7 @@ void GainTracker::conclude() noexcept {
   s.sensed_n = s.base.sensed_n + sensed_n;
 }
 
-void GainTracker::begin_jump(const Input& input, float variance_n2) noexcept {
+void GainTracker::begin_jump(const Input& input, float noise_n2) noexcept {
   State& s = state_;
   s.base = s.past;
   s.moments = {};
@@ -194,13 +204,14 @@ void GainTracker::begin_jump(const Input& input, float variance_n2) noexcept {
   s.prior_mean_n = from_air ? s.memory_n : 0.0F;
   s.prior_variance_n2 = from_air ? kEntry_variance * square(s.memory_n)
                                  : square(kJump_ratio * s.base.gain_n);
-  follow(s.past.feed, s.past.reading_n, variance_n2, 0);
-  follow(input.feed, input.reading_n, variance_n2, 1);
+  s.timing_n2 = 0.0F;
+  follow(s.past.feed, s.past.feed_sigma, s.past.reading_n, noise_n2, 0);
+  follow(input.feed, input.feed_sigma, input.reading_n, noise_n2, 1);
   s.samples = 2;
 }
 
 void GainTracker::coast(float feed) noexcept {
-  predict(feed, kDrift_ratio_sqrt_s * std::sqrt(config_.period_s));
+  predict(feed, 0.0F, kDrift_ratio_sqrt_s * std::sqrt(config_.period_s));
   state_.samples = 0;
   state_.ticks = 0;
 }
@@ -214,6 +225,7 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
                      .sensed_n = s.sensed_n,
                      .gain_n = s.gain_n,
                      .feed = input.feed,
+                     .feed_sigma = input.feed_sigma,
                      .reading_n = input.reading_n,
                      .variance_n2 = s.covariance[kKK]};
   const float trend = std::clamp(s.correlation / std::max(s.power, 0.5F), 0.0F, 1.0F);
@@ -224,14 +236,14 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
                                       square(config_.noise_n),
                                   square(input.reading_sigma_n));
   Output out{};
-  predict(input.feed, drift);
+  predict(input.feed, input.feed_sigma, drift);
   const float innovation_n = input.reading_n - s.sensed_n;
   const float variance_n2 = s.covariance[kSS] + noise_n2;
   out.innovation = innovation_n / std::sqrt(variance_n2);
 
   if (s.samples > 0) {
     ++s.samples;
-    follow(input.feed, input.reading_n, noise_n2, s.samples - 1);
+    follow(input.feed, input.feed_sigma, input.reading_n, noise_n2, s.samples - 1);
     conclude();
     if (s.misfit > kBadFit + kBadFitEach * static_cast<float>(s.samples)) {
       begin_jump(input, noise_n2);

@@ -57,6 +57,7 @@ class GainTracker {
     float reading_n;
     float reading_sigma_n;  // as the estimate states it; the config's noise is the least
     float feed;             // z: mean over the tick that ends now
+    float feed_sigma;       // of z, because nobody knows when exactly the CNC reads the override
     float entry_n;          // in the air a reading this far above the expected one is an entry
     bool air;
   };
@@ -84,6 +85,7 @@ class GainTracker {
     float sensed_n = 0.0F;
     float gain_n = 0.0F;
     float feed = 0.0F;  // of the tick after it
+    float feed_sigma = 0.0F;
     float reading_n = 0.0F;  // at the end of that tick
     float variance_n2 = 1.0F;
   };
@@ -103,6 +105,7 @@ class GainTracker {
     std::array<Moment, kMoments> moments{};
     float residual = 0.0F;  // sum of r^2 / R if nothing happened
     float misfit = 0.0F;    // the same of the moment that fits best
+    float timing_n2 = 0.0F;  // variance of the reading because the feed's moment is unknown
     float prior_mean_n = 0.0F;
     float prior_variance_n2 = 1.0F;
     std::uint32_t samples = 0;  // 0: no jump
@@ -125,10 +128,11 @@ class GainTracker {
  private:
   explicit GainTracker(const Config& config) noexcept;
 
-  void predict(float feed, float drift) noexcept;
+  void predict(float feed, float feed_sigma, float drift) noexcept;
   void correct(float innovation_n, float variance_n2) noexcept;
-  void begin_jump(const Input& input, float variance_n2) noexcept;
-  void follow(float feed, float reading_n, float variance_n2, std::uint32_t tick) noexcept;
+  void begin_jump(const Input& input, float noise_n2) noexcept;
+  void follow(float feed, float feed_sigma, float reading_n, float noise_n2,
+              std::uint32_t tick) noexcept;
   void conclude() noexcept;
   void begin(const Input& input) noexcept;
   void settle_in_air() noexcept;

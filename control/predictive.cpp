@@ -34,6 +34,7 @@ std::expected<void, Predictive::ConfigError> Predictive::Config::check() const n
   if (!(period_s > 0.0F && period_s <= 10.0F)) return fail(ConfigError::kPeriod);
   if (!(latency_s >= 0.0F && latency_s <= static_cast<float>(kHistory - 2) * period_s))
     return fail(ConfigError::kLatency);
+  if (!(latency_sigma_s >= 0.0F && latency_sigma_s <= 1.0F)) return fail(ConfigError::kLatency);
   if (!(feed_lag_s >= 0.0F && feed_lag_s <= 10.0F && process_lag_s > 0.0F &&
         process_lag_s <= 10.0F && sensor_lag_s >= 0.0F && sensor_lag_s <= 10.0F))
     return fail(ConfigError::kLags);
@@ -92,7 +93,7 @@ Predictive::Predictive(const Config& config, const GainTracker& tracker) noexcep
 }
 
 // What the override did to the feed since the last tick: mean of v. (C70)-(C73)
-float Predictive::known_feed(float applied_pct) noexcept {
+auto Predictive::known_feed(float applied_pct) noexcept -> KnownFeed {
   State& s = state_;
   const float now = applied_pct == s.sent_pct ? s.sent[0]
                     : applied_pct > 0.0F      ? power_positive(0.01F * applied_pct,
@@ -104,7 +105,9 @@ float Predictive::known_feed(float applied_pct) noexcept {
   s.sent_pct = applied_pct;
   const float first = s.feed.advance(early_, config_.feed_lag_s, s.sent[whole_ticks_ + 1]);
   const float second = s.feed.advance(late_, config_.feed_lag_s, s.sent[whole_ticks_]);
-  return (early_.length_s * first + late_.length_s * second) / config_.period_s;
+  const float step = s.sent[whole_ticks_] - s.sent[whole_ticks_ + 1];
+  return {.mean = (early_.length_s * first + late_.length_s * second) / config_.period_s,
+          .sigma = estimator::magnitude(step) * config_.latency_sigma_s / config_.period_s};
 }
 
 // To the end of the dead time, with the codes that are on their way. (C86)
@@ -207,15 +210,16 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   const float speed = input.spindle_ratio > 0.0F
                           ? power_positive(input.spindle_ratio, -config_.feed_exponent)
                           : 1.0F;
-  const float feed = known_feed(input.override_applied_pct) * speed;
+  const KnownFeed feed = known_feed(input.override_applied_pct);
   if (input.mode == LawMode::kHold) {
-    tracker_.coast(feed);
+    tracker_.coast(feed.mean * speed);
     return law_answer(input.override_applied_pct);
   }
   const float gain_before_n = tracker_.state().gain_n;
   const auto seen = tracker_.step({.reading_n = input.force_n,
                                    .reading_sigma_n = input.force_sigma_n,
-                                   .feed = feed,
+                                   .feed = feed.mean * speed,
+                                   .feed_sigma = feed.sigma * speed,
                                    .entry_n = kEntry_ratio * input.force_reference_n,
                                    .air = input.phase == CutPhase::kAir});
   s.since_jump_s = seen.jumped ? 0.0F : std::min(s.since_jump_s + config_.period_s, 100.0F);

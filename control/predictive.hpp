@@ -44,6 +44,7 @@ class Predictive {
   struct Config {
     float period_s;
     float latency_s;         // from a byte on the port to a feed reference that moves
+    float latency_sigma_s;   // of that: a PLC's scan over sqrt(12)
     float feed_lag_s;        // of the feed servo
     float process_lag_s;     // of the cut, one to one and a half turns of the spindle
     float sensor_lag_s;      // of the force estimate
@@ -101,7 +102,11 @@ class Predictive {
   };
   enum Reach : std::size_t { kOneTick, kTwoTicks, kMiddle, kCalm, kReaches };
 
-  [[nodiscard]] float known_feed(float applied_pct) noexcept;
+  struct KnownFeed {
+    float mean;  // over the tick that ends
+    float sigma;
+  };
+  [[nodiscard]] KnownFeed known_feed(float applied_pct) noexcept;
   [[nodiscard]] Forecast forecast(float force_n, float drive_n) const noexcept;
   [[nodiscard]] float pessimistic_gain_n(const GainTracker::Output& seen) noexcept;
   [[nodiscard]] Reach reach(const Forecast& ahead, float reference_n) noexcept;
