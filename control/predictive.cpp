@@ -11,6 +11,7 @@ using estimator::power_positive;
 
 constexpr float kSpreadFree = 0.04F;  // spread of the gain that is not feared
 constexpr float kSpreadMost = 0.6F;
+constexpr float kWary = 1.0F;         // times the caution while a jump upwards is learned
 constexpr float kLead = 0.5862F;      // of a gain that drifts upwards
 constexpr float kAfterJump_s = 0.35F;
 constexpr float kAfterJump_1_s = 4.835F;  // faster recovery while a jump is being learned
@@ -138,9 +139,10 @@ float Predictive::pessimistic_gain_n(const GainTracker::Output& seen) noexcept {
   }
   s.last_gain_n = seen.gain_n;
   const float spread = std::min(seen.gain_sigma_n / seen.gain_n, kSpreadMost);
+  const float caution = config_.caution_ratio * (seen.resolving && seen.rising ? kWary : 1.0F);
   const float ahead_s = config_.latency_s + period_s + 0.5F * config_.process_lag_s;
   const float lead = seen.trend > 0.1F ? std::clamp(kLead * s.trend_1_s * ahead_s, 0.0F, 0.3F) : 0.0F;
-  return seen.gain_n * (1.0F + config_.caution_ratio * std::max(spread - kSpreadFree, 0.0F)) *
+  return seen.gain_n * (1.0F + caution * std::max(spread - kSpreadFree, 0.0F)) *
          (1.0F + lead);
 }
 
@@ -227,7 +229,8 @@ auto Predictive::step(const Input& input) noexcept -> Output {
 
   const float gain_n = pessimistic_gain_n(seen);
   const bool rise = may_rise(seen, input.phase);
-  const float rate = s.since_jump_s < kAfterJump_s ? kAfterJump_1_s : config_.recovery_1_s;
+  s.recovering_s = seen.jumped || !rise ? 0.0F : std::min(s.recovering_s + config_.period_s, 100.0F);
+  const float rate = s.recovering_s < kAfterJump_s ? kAfterJump_1_s : config_.recovery_1_s;
   const float kept = rise ? s.feared_n * exp_bounded(-rate * config_.period_s) : s.feared_n;
   s.feared_n = input.phase == CutPhase::kAir && !seen.resolving ? 0.0F : std::max(gain_n, kept);
 

@@ -73,6 +73,7 @@ class Predictive {
     float sent_pct = 100.0F;             // u of sent[0]
     float feared_n = 0.0F;               // pessimistic gain K_c
     float since_jump_s = 100.0F;
+    float recovering_s = 100.0F;  // since the override may rise again
     float before_jump_n = 0.0F;  // gain before a jump down, while the cut may be lost; else 0
     float held_s = 0.0F;         // the present code has been sent for
     float trend_1_s = 0.0F;      // relative slope of the gain
