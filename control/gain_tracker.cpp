@@ -16,12 +16,14 @@ constexpr float kTrend_ratio_sqrt_s = 0.168F;  // more of it for each unit of tr
 constexpr float kTrendFloor = 0.1F;
 constexpr float kTrendMemory_s = 0.25F;
 constexpr float kTwiceThreshold_ratio = 0.81F;  // two readings in a row need this of the threshold
-constexpr float kJump_ratio = 1.0F;     // spread of a jump, of the gain
+constexpr float kJump_ratio = 1.0F;             // spread of a jump, of the gain
 constexpr float kEntry_variance = 2.0F;  // of the first gain, of the square of the remembered one
 constexpr float kSettled_ratio = 0.1F;   // spread of a gain that is remembered
+constexpr float kModelSpread_ratio =
+    0.06F;  // of a gain that was learned from a jump: the lags are not exact
 constexpr float kBeginSpread_ratio = 0.2F;
 constexpr float kLeastFeed = 0.01F;
-constexpr float kNothing = 0.01F;       // probability that an alarm means nothing
+constexpr float kNothing = 0.01F;  // probability that an alarm means nothing
 constexpr float kBadFit = 9.0F;
 constexpr float kBadFitEach = 4.0F;
 constexpr std::array<float, 3> kOnset{0.05F, 0.35F, 0.7F};  // parts of a tick
@@ -157,7 +159,8 @@ void GainTracker::conclude() noexcept {
     const float sharpness = prior + m.weight;
     jump_n[k] = (s.prior_mean_n * prior + m.fit) / sharpness;
     variance_n2[k] = 1.0F / sharpness;
-    const float misfit = square(s.prior_mean_n) * prior + s.residual - sharpness * square(jump_n[k]);
+    const float misfit =
+        square(s.prior_mean_n) * prior + s.residual - sharpness * square(jump_n[k]);
     cost[k] = misfit + estimator::log_positive(sharpness * s.prior_variance_n2) +
               2.0F * 1.8018F;  // ln 6, about: the other probability over the moments
     s.misfit = std::min(s.misfit, misfit);
@@ -186,7 +189,8 @@ void GainTracker::conclude() noexcept {
     std::size_t at = 0;
     for (std::size_t a = 0; a < 3; ++a) {
       for (std::size_t b = a; b < 3; ++b) {
-        s.covariance[at++] += share[k] * (apart[a] * apart[b] + variance_n2[k] * along[a] * along[b]);
+        s.covariance[at++] +=
+            share[k] * (apart[a] * apart[b] + variance_n2[k] * along[a] * along[b]);
       }
     }
   }
@@ -202,8 +206,8 @@ void GainTracker::begin_jump(const Input& input, float noise_n2) noexcept {
   s.residual = 0.0F;
   const bool from_air = !(s.base.gain_n > 0.05F * s.memory_n);
   s.prior_mean_n = from_air ? s.memory_n : 0.0F;
-  s.prior_variance_n2 = from_air ? kEntry_variance * square(s.memory_n)
-                                 : square(kJump_ratio * s.base.gain_n);
+  s.prior_variance_n2 =
+      from_air ? kEntry_variance * square(s.memory_n) : square(kJump_ratio * s.base.gain_n);
   s.timing_n2 = 0.0F;
   follow(s.past.feed, s.past.feed_sigma, s.past.reading_n, noise_n2, 0);
   follow(input.feed, input.feed_sigma, input.reading_n, noise_n2, 1);
@@ -229,12 +233,12 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
                      .reading_n = input.reading_n,
                      .variance_n2 = s.covariance[kKK]};
   const float trend = std::clamp(s.correlation / std::max(s.power, 0.5F), 0.0F, 1.0F);
-  const float drift = (kDrift_ratio_sqrt_s +
-                       kTrend_ratio_sqrt_s * std::max(trend - kTrendFloor, 0.0F)) *
-                      std::sqrt(config_.period_s);
-  const float noise_n2 = std::max(square(config_.noise_ratio * input.reading_n) +
-                                      square(config_.noise_n),
-                                  square(input.reading_sigma_n));
+  const float drift =
+      (kDrift_ratio_sqrt_s + kTrend_ratio_sqrt_s * std::max(trend - kTrendFloor, 0.0F)) *
+      std::sqrt(config_.period_s);
+  const float noise_n2 =
+      std::max(square(config_.noise_ratio * input.reading_n) + square(config_.noise_n),
+               square(input.reading_sigma_n));
   Output out{};
   predict(input.feed, input.feed_sigma, drift);
   const float innovation_n = input.reading_n - s.sensed_n;
@@ -252,10 +256,10 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
     }
   } else {
     const float size = magnitude(out.innovation);
-    const bool again = size > kTwiceThreshold_ratio * config_.jump_threshold &&
-                       out.innovation * s.last_innovation > 0.0F &&
-                       magnitude(s.last_innovation) >
-                           kTwiceThreshold_ratio * config_.jump_threshold;
+    const bool again =
+        size > kTwiceThreshold_ratio * config_.jump_threshold &&
+        out.innovation * s.last_innovation > 0.0F &&
+        magnitude(s.last_innovation) > kTwiceThreshold_ratio * config_.jump_threshold;
     const bool surprise = size > config_.jump_threshold || again;
     const bool entry = air && (!input.air || innovation_n > input.entry_n);
     if (s.ticks >= 1 && (air ? entry || (surprise && innovation_n > 0.0F) : surprise)) {
@@ -277,7 +281,10 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
   if (s.samples > 0) s.correlation = 0.0F;
   out.resolving = s.samples > 0;
   out.rising = s.rising != 0;
-  if (s.samples >= kSamples) s.samples = 0;
+  if (s.samples >= kSamples) {
+    s.samples = 0;
+    s.covariance[kKK] += square(kModelSpread_ratio * s.gain_n);
+  }
   s.past = before;
   s.ticks = 1;
   out.force_n = std::max(s.force_n, 0.0F);

@@ -27,7 +27,7 @@ class GainTracker {
  public:
   enum class ConfigError : std::uint8_t { kPeriod, kLags, kGain, kNoise, kThreshold };
 
-  static constexpr std::size_t kMoments = 6;   // of a jump: 2 ticks of 3
+  static constexpr std::size_t kMoments = 6;    // of a jump: 2 ticks of 3
   static constexpr std::uint32_t kSamples = 5;  // readings that a jump is followed for
 
   struct Config {
@@ -66,11 +66,11 @@ class GainTracker {
     float force_n;
     float gain_n;
     float gain_sigma_n;
-    float trend;          // correlation of successive innovations, 0..1: the gain drifts
-    float innovation;     // in standard deviations
-    bool jumped;          // with this reading
-    bool resolving;       // a jump is being followed
-    bool rising;          // the jump is upwards
+    float trend;       // correlation of successive innovations, 0..1: the gain drifts
+    float innovation;  // in standard deviations
+    bool jumped;       // with this reading
+    bool resolving;    // a jump is being followed
+    bool rising;       // the jump is upwards
   };
 
   struct Moment {
@@ -103,8 +103,8 @@ class GainTracker {
     // The jump that is being followed.
     Point base{};  // open loop since the jump may have begun
     std::array<Moment, kMoments> moments{};
-    float residual = 0.0F;  // sum of r^2 / R if nothing happened
-    float misfit = 0.0F;    // the same of the moment that fits best
+    float residual = 0.0F;   // sum of r^2 / R if nothing happened
+    float misfit = 0.0F;     // the same of the moment that fits best
     float timing_n2 = 0.0F;  // variance of the reading because the feed's moment is unknown
     float prior_mean_n = 0.0F;
     float prior_variance_n2 = 1.0F;

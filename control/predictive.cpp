@@ -11,22 +11,22 @@ using estimator::power_positive;
 
 constexpr float kSpreadFree = 0.04F;  // spread of the gain that is not feared
 constexpr float kSpreadMost = 0.6F;
-constexpr float kWary = 1.0F;         // times the caution while a jump upwards is learned
-constexpr float kLead = 0.5862F;      // of a gain that drifts upwards
+constexpr float kWary = 1.0F;     // times the caution while a jump upwards is learned
+constexpr float kLead = 0.5862F;  // of a gain that drifts upwards
 constexpr float kAfterJump_s = 0.35F;
 constexpr float kAfterJump_1_s = 4.835F;  // faster recovery while a jump is being learned
 constexpr float kDeepRetreat_s = 0.4F;    // after a jump
 constexpr float kAbove_ratio = 1.04F;
 constexpr float kFarAbove_ratio = 1.15F;
 constexpr float kMiddle_s = 0.2F;
-constexpr float kOver_ratio = 1.05F;      // static force of a command, over the reference
+constexpr float kOver_ratio = 1.05F;  // static force of a command, over the reference
 constexpr float kOverAfterJump_ratio = 1.15F;
-constexpr float kKeep_ratio = 0.03F;      // of the override: not worth a change at first
+constexpr float kKeep_ratio = 0.03F;  // of the override: not worth a change at first
 constexpr float kKeepFade_s = 1.5F;
-constexpr float kCoarse_ratio = 0.04F;    // of the override: coarser steps are rounded down
-constexpr float kEntry_ratio = 0.05F;     // of the reference: a reading above it ends the air
-constexpr float kLost_ratio = 0.2F;       // of the gain before: less is a lost cut
-constexpr float kLost_s = 0.5F;          // after which a cut that is left is a light one
+constexpr float kCoarse_ratio = 0.04F;  // of the override: coarser steps are rounded down
+constexpr float kEntry_ratio = 0.05F;   // of the reference: a reading above it ends the air
+constexpr float kLost_ratio = 0.2F;     // of the gain before: less is a lost cut
+constexpr float kLost_s = 0.5F;         // after which a cut that is left is a light one
 
 }  // namespace
 
@@ -97,9 +97,9 @@ Predictive::Predictive(const Config& config, const GainTracker& tracker) noexcep
 auto Predictive::known_feed(float applied_pct) noexcept -> KnownFeed {
   State& s = state_;
   const float now = applied_pct == s.sent_pct ? s.sent[0]
-                    : applied_pct > 0.0F      ? power_positive(0.01F * applied_pct,
-                                                               config_.feed_exponent)
-                                              : 0.0F;
+                    : applied_pct > 0.0F
+                        ? power_positive(0.01F * applied_pct, config_.feed_exponent)
+                        : 0.0F;
   for (std::size_t k = kHistory - 1; k > 0; --k) s.sent[k] = s.sent[k - 1];
   s.sent[0] = now;
   s.held_s = applied_pct == s.sent_pct ? s.held_s + config_.period_s : 0.0F;
@@ -141,9 +141,9 @@ float Predictive::pessimistic_gain_n(const GainTracker::Output& seen) noexcept {
   const float spread = std::min(seen.gain_sigma_n / seen.gain_n, kSpreadMost);
   const float caution = config_.caution_ratio * (seen.resolving && seen.rising ? kWary : 1.0F);
   const float ahead_s = config_.latency_s + period_s + 0.5F * config_.process_lag_s;
-  const float lead = seen.trend > 0.1F ? std::clamp(kLead * s.trend_1_s * ahead_s, 0.0F, 0.3F) : 0.0F;
-  return seen.gain_n * (1.0F + caution * std::max(spread - kSpreadFree, 0.0F)) *
-         (1.0F + lead);
+  const float lead =
+      seen.trend > 0.1F ? std::clamp(kLead * s.trend_1_s * ahead_s, 0.0F, 0.3F) : 0.0F;
+  return seen.gain_n * (1.0F + caution * std::max(spread - kSpreadFree, 0.0F)) * (1.0F + lead);
 }
 
 // (C87)
@@ -160,9 +160,9 @@ float Predictive::wanted_pct(const Forecast& ahead, const Horizon& horizon,
                              float reference_n) const noexcept {
   if (!(ahead.drive_n > 1e-3F * reference_n)) return config_.ceiling_pct;
   const float own = 1.0F - horizon.force - horizon.feed;
-  const float w = (reference_n - horizon.force * ahead.force_n -
-                   ahead.drive_n * horizon.feed * ahead.feed) /
-                  (ahead.drive_n * own);
+  const float w =
+      (reference_n - horizon.force * ahead.force_n - ahead.drive_n * horizon.feed * ahead.feed) /
+      (ahead.drive_n * own);
   const float over = state_.since_jump_s < kLost_s ? kOverAfterJump_ratio : kOver_ratio;
   const float most = over * reference_n / ahead.drive_n;
   const float limited = std::min(w, most);
@@ -229,7 +229,8 @@ auto Predictive::step(const Input& input) noexcept -> Output {
 
   const float gain_n = pessimistic_gain_n(seen);
   const bool rise = may_rise(seen, input.phase);
-  s.recovering_s = seen.jumped || !rise ? 0.0F : std::min(s.recovering_s + config_.period_s, 100.0F);
+  s.recovering_s =
+      seen.jumped || !rise ? 0.0F : std::min(s.recovering_s + config_.period_s, 100.0F);
   const float rate = s.recovering_s < kAfterJump_s ? kAfterJump_1_s : config_.recovery_1_s;
   const float kept = rise ? s.feared_n * exp_bounded(-rate * config_.period_s) : s.feared_n;
   s.feared_n = input.phase == CutPhase::kAir && !seen.resolving ? 0.0F : std::max(gain_n, kept);
@@ -237,12 +238,12 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   const Forecast ahead = forecast(seen.force_n, gain_n * speed);
   Forecast feared = ahead;
   feared.drive_n = s.feared_n * speed;
-  float wanted = wanted_pct(feared, horizons_[reach(ahead, input.force_reference_n)],
-                            input.force_reference_n);
+  float wanted =
+      wanted_pct(feared, horizons_[reach(ahead, input.force_reference_n)], input.force_reference_n);
   if (!rise) wanted = std::min(wanted, input.override_applied_pct);
-  Output out = law_answer(input.mode == LawMode::kActive
-                              ? as_code(wanted, input.override_applied_pct)
-                              : input.override_applied_pct);
+  Output out =
+      law_answer(input.mode == LawMode::kActive ? as_code(wanted, input.override_applied_pct)
+                                                : input.override_applied_pct);
   out.process_gain_n_pct = 0.01F * seen.gain_n;
   out.process_gain_sigma_ratio = seen.gain_n > 0.0F ? seen.gain_sigma_n / seen.gain_n : 0.0F;
   return out;

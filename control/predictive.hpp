@@ -43,19 +43,19 @@ class Predictive {
 
   struct Config {
     float period_s;
-    float latency_s;         // from a byte on the port to a feed reference that moves
-    float latency_sigma_s;   // of that: a PLC's scan over sqrt(12)
-    float feed_lag_s;        // of the feed servo
-    float process_lag_s;     // of the cut, one to one and a half turns of the spindle
-    float sensor_lag_s;      // of the force estimate
-    float feed_exponent;     // of force over feed: 0.75..1
-    float process_gain_n;    // force at 100 %, before anything is known
-    float noise_ratio;       // of the estimate, of the force
-    float noise_n;           // of the estimate, beside it
-    float jump_threshold;    // in standard deviations; 4.2
-    float calm_horizon_s;    // settling time over 1.5; at least two periods
-    float recovery_1_s;      // rate at which a feared gain is forgotten
-    float caution_ratio;     // how much of the gain's spread is feared
+    float latency_s;        // from a byte on the port to a feed reference that moves
+    float latency_sigma_s;  // of that: a PLC's scan over sqrt(12)
+    float feed_lag_s;       // of the feed servo
+    float process_lag_s;    // of the cut, one to one and a half turns of the spindle
+    float sensor_lag_s;     // of the force estimate
+    float feed_exponent;    // of force over feed: 0.75..1
+    float process_gain_n;   // force at 100 %, before anything is known
+    float noise_ratio;      // of the estimate, of the force
+    float noise_n;          // of the estimate, beside it
+    float jump_threshold;   // in standard deviations; 4.2
+    float calm_horizon_s;   // settling time over 1.5; at least two periods
+    float recovery_1_s;     // rate at which a feared gain is forgotten
+    float caution_ratio;    // how much of the gain's spread is feared
     float floor_pct;
     float ceiling_pct;
     std::uint32_t step_pct;  // 1 or 10
@@ -74,9 +74,9 @@ class Predictive {
     float feared_n = 0.0F;               // pessimistic gain K_c
     float since_jump_s = 100.0F;
     float recovering_s = 100.0F;  // since the override may rise again
-    float before_jump_n = 0.0F;  // gain before a jump down, while the cut may be lost; else 0
-    float held_s = 0.0F;         // the present code has been sent for
-    float trend_1_s = 0.0F;      // relative slope of the gain
+    float before_jump_n = 0.0F;   // gain before a jump down, while the cut may be lost; else 0
+    float held_s = 0.0F;          // the present code has been sent for
+    float trend_1_s = 0.0F;       // relative slope of the gain
     float last_gain_n = 0.0F;
   };
 
@@ -118,7 +118,7 @@ class Predictive {
 
   Config config_;
   GainTracker tracker_;
-  std::uint32_t whole_ticks_;  // of the dead time
+  std::uint32_t whole_ticks_;    // of the dead time
   LagStep tick_, early_, late_;  // early_: the part of a tick before a byte arrives
   std::array<Horizon, kReaches> horizons_;
   State state_{};
