@@ -214,6 +214,13 @@ void GainTracker::begin_jump(const Input& input, float noise_n2) noexcept {
   s.samples = 2;
 }
 
+void GainTracker::restart() noexcept {
+  const float memory_n = state_.memory_n;
+  state_ = State{};
+  state_.memory_n = memory_n;
+  settle_in_air();
+}
+
 void GainTracker::coast(float feed) noexcept {
   predict(feed, 0.0F, kDrift_ratio_sqrt_s * std::sqrt(config_.period_s));
   state_.samples = 0;

@@ -122,6 +122,9 @@ class GainTracker {
   // The feed goes on, the reading is not to be learned from.
   void coast(float feed) noexcept;
 
+  // Another part: only the last gain is remembered.
+  void restart() noexcept;
+
   [[nodiscard]] const State& state() const noexcept { return state_; }
   void restore(const State& state) noexcept { state_ = state; }
 

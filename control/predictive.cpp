@@ -64,12 +64,20 @@ auto Predictive::make(const Config& config) noexcept -> std::expected<Predictive
                                           .noise_n = config.noise_n,
                                           .jump_threshold = config.jump_threshold});
   if (!tracker) return std::unexpected{ConfigError::kGain};
-  return Predictive{config, *tracker};
+  const auto map = PathMap::make({.period_s = config.period_s,
+                                  .feed_lag_s = config.feed_lag_s,
+                                  .sensor_lag_s = config.sensor_lag_s,
+                                  .feed_exponent = config.feed_exponent,
+                                  .gain_n = config.process_gain_n});
+  if (!map) return std::unexpected{ConfigError::kGain};
+  return Predictive{config, *tracker, *map};
 }
 
-Predictive::Predictive(const Config& config, const GainTracker& tracker) noexcept
+Predictive::Predictive(const Config& config, const GainTracker& tracker,
+                       const PathMap& map) noexcept
     : config_(config),
       tracker_(tracker),
+      map_(map),
       whole_ticks_(static_cast<std::uint32_t>(config.latency_s / config.period_s + 1e-4F)) {
   const auto step = [&config](float length_s) {
     return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
@@ -114,13 +122,15 @@ auto Predictive::known_feed(float applied_pct) noexcept -> KnownFeed {
 // To the end of the dead time, with the codes that are on their way. (C86)
 auto Predictive::forecast(float force_n, float drive_n) const noexcept -> Forecast {
   FeedState feed = state_.feed;
+  float path_s = 0.0F;
   const auto go = [&](const LagStep& step, float w) {
     const float mean = feed.advance(step, config_.feed_lag_s, w);
+    path_s += step.length_s * feed_ratio(mean);
     force_n = step.cut * force_n + (1.0F - step.cut) * drive_n * mean;
   };
   if (early_.length_s > 0.0F) go(early_, state_.sent[whole_ticks_]);
   for (std::size_t k = whole_ticks_; k > 0; --k) go(tick_, state_.sent[k - 1]);
-  return {.force_n = force_n, .feed = feed.v, .drive_n = drive_n};
+  return {.force_n = force_n, .feed = feed.v, .path_s = path_s, .drive_n = drive_n};
 }
 
 // (C84), (C85)
@@ -172,6 +182,20 @@ float Predictive::wanted_pct(const Forecast& ahead, const Horizon& horizon,
                     config_.floor_pct, config_.ceiling_pct);
 }
 
+float Predictive::feed_ratio(float w) const noexcept {
+  return w > 1e-4F ? power_positive(w, 1.0F / config_.feed_exponent) : 0.0F;
+}
+
+void Predictive::learn(const GainTracker::Output& seen, float feed, CutPhase phase) noexcept {
+  const bool settled = state_.since_jump_s > kLost_s && phase == CutPhase::kCut;
+  map_.learn({.feed_ratio = feed_ratio(feed),
+              .gain_n = seen.gain_n,
+              .jumped = seen.jumped,
+              .rising = seen.rising,
+              .resolving = seen.resolving,
+              .steady = settled && seen.trend < 0.3F});
+}
+
 // A code that the CNC has, and not a new one for nothing. (C90)
 float Predictive::as_code(float wanted_pct, float sent_pct) noexcept {
   const auto step = static_cast<float>(config_.step_pct);
@@ -209,6 +233,10 @@ bool Predictive::may_rise(const GainTracker::Output& seen, CutPhase phase) noexc
 
 auto Predictive::step(const Input& input) noexcept -> Output {
   State& s = state_;
+  if (input.part_start) {
+    tracker_.restart();
+    map_.start();
+  }
   const float speed = input.spindle_ratio > 0.0F
                           ? power_positive(input.spindle_ratio, -config_.feed_exponent)
                           : 1.0F;
@@ -238,9 +266,18 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   const Forecast ahead = forecast(seen.force_n, gain_n * speed);
   Forecast feared = ahead;
   feared.drive_n = s.feared_n * speed;
+  if (config_.learns) learn(seen, feed.mean, input.phase);
   float wanted =
       wanted_pct(feared, horizons_[reach(ahead, input.force_reference_n)], input.force_reference_n);
   if (!rise) wanted = std::min(wanted, input.override_applied_pct);
+  if (config_.learns) {
+    wanted = std::max(map_.limit({.reference_n = input.force_reference_n,
+                                  .ahead_s = ahead.path_s,
+                                  .force_n = ahead.force_n,
+                                  .override_pct = wanted,
+                                  .air = input.phase == CutPhase::kAir}),
+                      config_.floor_pct);
+  }
   Output out =
       law_answer(input.mode == LawMode::kActive ? as_code(wanted, input.override_applied_pct)
                                                 : input.override_applied_pct);
@@ -252,12 +289,14 @@ auto Predictive::step(const Input& input) noexcept -> Output {
 auto Predictive::state() const noexcept -> State {
   State s = state_;
   s.tracker = tracker_.state();
+  s.map = map_.state();
   return s;
 }
 
 void Predictive::restore(const State& state) noexcept {
   state_ = state;
   tracker_.restore(state.tracker);
+  map_.restore(state.map);
 }
 
 }  // namespace cutforce::control

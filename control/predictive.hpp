@@ -19,6 +19,7 @@
 #include "control/force_model.hpp"
 #include "control/gain_tracker.hpp"
 #include "control/law.hpp"
+#include "control/path_map.hpp"
 
 namespace cutforce::control {
 
@@ -59,6 +60,7 @@ class Predictive {
     float floor_pct;
     float ceiling_pct;
     std::uint32_t step_pct;  // 1 or 10
+    bool learns;             // from one part to the next; needs the start of each
 
     [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
   };
@@ -68,6 +70,7 @@ class Predictive {
 
   struct State {
     GainTracker::State tracker{};
+    PathMap::State map{};
     FeedState feed{};
     std::array<float, kHistory> sent{};  // (u/u0)^p, newest first
     float sent_pct = 100.0F;             // u of sent[0]
@@ -89,11 +92,12 @@ class Predictive {
   void restore(const State& state) noexcept;
 
  private:
-  Predictive(const Config& config, const GainTracker& tracker) noexcept;
+  Predictive(const Config& config, const GainTracker& tracker, const PathMap& map) noexcept;
 
   struct Forecast {
     float force_n;  // at the end of the dead time
     float feed;     // v there
+    float path_s;   // until then, in seconds at 100 %
     float drive_n;  // feared gain at the present spindle speed: force for a unit of feed
   };
   struct Horizon {  // of the force, (C88)
@@ -113,11 +117,14 @@ class Predictive {
   [[nodiscard]] Reach reach(const Forecast& ahead, float reference_n) noexcept;
   [[nodiscard]] float wanted_pct(const Forecast& ahead, const Horizon& horizon,
                                  float reference_n) const noexcept;
+  [[nodiscard]] float feed_ratio(float w) const noexcept;
+  void learn(const GainTracker::Output& seen, float feed, CutPhase phase) noexcept;
   [[nodiscard]] float as_code(float wanted_pct, float sent_pct) noexcept;
   [[nodiscard]] bool may_rise(const GainTracker::Output& seen, CutPhase phase) noexcept;
 
   Config config_;
   GainTracker tracker_;
+  PathMap map_;
   std::uint32_t whole_ticks_;    // of the dead time
   LagStep tick_, early_, late_;  // early_: the part of a tick before a byte arrives
   std::array<Horizon, kReaches> horizons_;
