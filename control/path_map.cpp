@@ -22,6 +22,7 @@ constexpr float kWearMemory_s = 1.0F;
 constexpr float kFar_ratio = 1.3F;       // a gain this far off the map's tells nothing of wear
 constexpr float kDoubt_ratio = 0.75F;    // of the reference
 constexpr float kDoubt_s = 0.7F;
+constexpr float kDoubtWay_s = 0.2F;      // path: the cell may begin this much early
 constexpr float kDoubtInAir_s = 1.75F;
 
 constexpr std::size_t index_of(float position_s) noexcept {
@@ -50,7 +51,7 @@ void PathMap::write_to(float position_s, float gain_n) noexcept {
 void PathMap::learn(const Lesson& lesson) noexcept {
   State& s = state_;
   const float went_s = lesson.feed_ratio * config_.period_s;
-  s.earlier_s = {s.position_s, s.earlier_s[0], s.earlier_s[1]};
+  s.earlier_s = {s.position_s, s.earlier_s[0]};
   s.position_s += went_s;  // (C92)
   if (s.started == 0) return;
   // Where the tool was when the force arose that has just been read.
@@ -58,7 +59,7 @@ void PathMap::learn(const Lesson& lesson) noexcept {
   const float seen_s = s.position_s - lesson.feed_ratio * late_s;
   if (lesson.jumped) {
     // Up to where the jump may have been, the old gain holds. After a jump down it holds until now.
-    write_to(lesson.rising ? s.earlier_s[2] - lesson.feed_ratio * late_s : seen_s, s.last_gain_n);
+    write_to(lesson.rising ? s.earlier_s[1] : seen_s, s.last_gain_n);
   }
   if (lesson.resolving) {
     if (!lesson.rising) write_to(seen_s, s.last_gain_n);
@@ -101,14 +102,20 @@ float PathMap::limit(const Question& question) noexcept {
   State& s = state_;
   if (s.started == 0 || s.trusted == 0) return question.override_pct;
   const float scale_pct =
-      100.0F / kScale *
+      100.0F / kScale * question.spindle_ratio *
       power_positive(question.reference_n / (config_.gain_n * s.wear_ratio),
                      1.0F / config_.feed_exponent);  // (C94)
   const float allowed_pct = slowest(question, scale_pct);
   const bool held_down =
       allowed_pct < question.override_pct && question.force_n < kDoubt_ratio * question.reference_n;
-  s.doubt_s = held_down ? s.doubt_s + config_.period_s : 0.0F;
-  if (s.doubt_s > (question.air ? kDoubtInAir_s : kDoubt_s)) s.trusted = 0;  // (C97)
+  if (!held_down) {
+    s.doubt_s = 0.0F;
+    s.doubt_from_s = s.position_s;
+  } else {
+    s.doubt_s += config_.period_s;
+  }
+  const bool long_enough = s.doubt_s > (question.air ? kDoubtInAir_s : kDoubt_s);
+  if (long_enough && s.position_s - s.doubt_from_s > kDoubtWay_s) s.trusted = 0;  // (C97)
   return allowed_pct;
 }
 

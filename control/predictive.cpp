@@ -275,6 +275,7 @@ auto Predictive::step(const Input& input) noexcept -> Output {
                                   .ahead_s = ahead.path_s,
                                   .force_n = ahead.force_n,
                                   .override_pct = wanted,
+                                  .spindle_ratio = input.spindle_ratio,
                                   .air = input.phase == CutPhase::kAir}),
                       config_.floor_pct);
   }
