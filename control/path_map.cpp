@@ -22,7 +22,7 @@ constexpr float kWearMemory_s = 1.0F;
 constexpr float kFar_ratio = 1.3F;       // a gain this far off the map's tells nothing of wear
 constexpr float kDoubt_ratio = 0.75F;    // of the reference
 constexpr float kDoubt_s = 0.7F;
-constexpr float kDoubtWay_s = 0.2F;      // path: the cell may begin this much early
+constexpr float kDoubtWay_s = 0.3F;      // path: the cell may begin this much early
 constexpr float kDoubtInAir_s = 1.75F;
 
 constexpr std::size_t index_of(float position_s) noexcept {
