@@ -24,13 +24,12 @@ CuttingProcess::CuttingProcess(const ProcessConfig& process, const LoadConfig& l
       gear_ratio_(gear_ratio),
       lag_share_(lag_share(period_s, process.lag_s)) {}
 
-double CuttingProcess::static_force_n(const ProcessInput& input) noexcept {
+double CuttingProcess::force_at_depth_n(double depth_m, const ProcessInput& input) noexcept {
   const ProcessConfig& p = process_;
-  state_.depth_m = depth_.value(p.depth_m, input.position_m);
   const double turns_s = std::abs(input.spindle_turns_s);
-  if (!(state_.depth_m > 0.0) || turns_s < kLeastTurnsS || !(input.feed_m_s > 0.0)) return 0.0;
+  if (!(depth_m > 0.0) || turns_s < kLeastTurnsS || !(input.feed_m_s > 0.0)) return 0.0;
   const double relative = input.feed_m_s / turns_s / p.nominal_feed_m_rev;
-  double force_n = p.specific_force_n_m2 * state_.depth_m * p.nominal_feed_m_rev *
+  double force_n = p.specific_force_n_m2 * depth_m * p.nominal_feed_m_rev *
                    (p.exponent == 1.0 ? relative : power(relative, p.exponent)) *
                    wear_.value(p.wear_ratio, input.time_s);  // (S30)
   for (const HardSpot& spot : p.hard_spots) {
@@ -42,6 +41,16 @@ double CuttingProcess::static_force_n(const ProcessInput& input) noexcept {
     force_n = 0.0;
   }
   return force_n;
+}
+
+double CuttingProcess::static_force_n(const ProcessInput& input) noexcept {
+  state_.depth_m = depth_.value(process_.depth_m, input.position_m);
+  return force_at_depth_n(state_.depth_m, input);
+}
+
+void CuttingProcess::settle(const ProcessInput& input) noexcept {
+  state_.force_n = static_force_n(input);
+  per_depth_n_m_ = force_at_depth_n(1.0, input);
 }
 
 double CuttingProcess::plain_load_nm(double time_s) noexcept {
@@ -57,8 +66,14 @@ void CuttingProcess::step(const ProcessInput& input) noexcept {
   double torque_nm = plain_load_nm(input.time_s);
   state_.diameter_m = diameter_.value(process_.diameter_m, input.position_m);
   if (process_.specific_force_n_m2 > 0.0) {
-    state_.force_n = lagged(state_.force_n, static_force_n(input), lag_share_);  // (S31)
-    torque_nm += state_.force_n * 0.5 * state_.diameter_m / gear_ratio_;         // (S32)
+    if (process_.depth_after_lag) {
+      state_.depth_m = depth_.value(process_.depth_m, input.position_m);
+      per_depth_n_m_ = lagged(per_depth_n_m_, force_at_depth_n(1.0, input), lag_share_);
+      state_.force_n = state_.depth_m * per_depth_n_m_;
+    } else {
+      state_.force_n = lagged(state_.force_n, static_force_n(input), lag_share_);  // (S31)
+    }
+    torque_nm += state_.force_n * 0.5 * state_.diameter_m / gear_ratio_;  // (S32)
   } else {
     state_.force_n = torque_nm * gear_ratio_ / (0.5 * state_.diameter_m);
   }

@@ -1,6 +1,7 @@
 // Turning with depth over position: a static force behind a first-order lag, P3 (10).
 //   F_static = k_s a(x) h_0 (h/h_0)^p w(t) H(x) E(angle)          (S30)
 //   tau_p dF/dt = F_static - F                                    (S31)
+//   or, with depth_after_lag, F = a G, tau_p dG/dt = F_static/a - G
 //   T_motor = F D(x)/2 / gear                                     (S32)
 // a depth of cut [m], h feed per turn [m], h_0 the nominal one, w wear, H hard spots, E 0 or 1.
 // A plain load torque over time may stand in its place or add to it.
@@ -24,6 +25,7 @@ struct ProcessConfig {
   double nominal_feed_m_rev = 1.0;   // h_0
   double exponent = 1.0;             // p
   double lag_s = 0.0;                // tau_p
+  bool depth_after_lag = false;      // P2: the slow pole is the drive's, depth acts at once
   Profile depth_m{0.0};              // over position
   Profile diameter_m{1.0};           // over position
   Profile wear_ratio{1.0};           // over time
@@ -77,8 +79,11 @@ class CuttingProcess {
   [[nodiscard]] const State& state() const noexcept { return state_; }
   // Without lag and without rotation: what the force tends to.
   [[nodiscard]] double static_force_n(const ProcessInput& input) noexcept;
+  // As if feed and cut had been these for long.
+  void settle(const ProcessInput& input) noexcept;
 
  private:
+  [[nodiscard]] double force_at_depth_n(double depth_m, const ProcessInput& input) noexcept;
   [[nodiscard]] double plain_load_nm(double time_s) noexcept;
 
   ProcessConfig process_;
@@ -86,6 +91,7 @@ class CuttingProcess {
   LoadFrictionConfig friction_;
   double gear_ratio_;
   double lag_share_;
+  double per_depth_n_m_ = 0.0;  // lagged, of depth_after_lag
   ProfileCursor depth_, diameter_, wear_, torque_, ratio_, per_nm_;
   State state_;
 };

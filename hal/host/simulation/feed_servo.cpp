@@ -19,6 +19,15 @@ FeedServo::FeedServo(const FeedConfig& config, double period_s, std::uint64_t se
   state_.override_pct = config.initial_override_pct;
 }
 
+double FeedServo::programmed_m_s(double spindle_turns_s) const noexcept {
+  return config_.feed_m_rev > 0.0 ? config_.feed_m_rev * std::abs(spindle_turns_s)
+                                  : config_.feed_m_s;
+}
+
+void FeedServo::settle(double spindle_turns_s) noexcept {
+  state_.feed_m_s = 0.01 * config_.initial_override_pct * programmed_m_s(spindle_turns_s);
+}
+
 void FeedServo::step(double time_s, double spindle_turns_s) noexcept {
   if (!(config_.scan_s > 0.0)) {
     scanned_pct_ = wire_pct_;
@@ -30,9 +39,8 @@ void FeedServo::step(double time_s, double spindle_turns_s) noexcept {
   state_.override_pct = latency_.push(scanned_pct_);  // (S28)
 
   state_.feeding = time_s >= config_.start_s && state_.position_m < config_.length_m;
-  const double programmed_m_s =
-      config_.feed_m_rev > 0.0 ? config_.feed_m_rev * std::abs(spindle_turns_s) : config_.feed_m_s;
-  const double wanted_m_s = state_.feeding ? 0.01 * state_.override_pct * programmed_m_s : 0.0;
+  const double wanted_m_s =
+      state_.feeding ? 0.01 * state_.override_pct * programmed_m_s(spindle_turns_s) : 0.0;
   // Exact for a constant command over the period, (S29).
   const double gap_m_s = state_.feed_m_s - wanted_m_s;
   state_.position_m += wanted_m_s * period_s_ + gap_m_s * config_.lag_s * lag_share_;

@@ -35,9 +35,13 @@ class FeedServo {
 
   void set_override(double percent) noexcept { wire_pct_ = percent; }
   void step(double time_s, double spindle_turns_s) noexcept;
+  // Moving at the initial override already.
+  void settle(double spindle_turns_s) noexcept;
   [[nodiscard]] const State& state() const noexcept { return state_; }
 
  private:
+  [[nodiscard]] double programmed_m_s(double spindle_turns_s) const noexcept;
+
   FeedConfig config_;
   double period_s_;
   double lag_share_;

@@ -1,48 +1,15 @@
 #include "hal/host/simulation/machine_config.hpp"
 
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <string>
-#include <utility>
+
+#include "hal/host/simulation/config_checker.hpp"
 
 namespace cutforce::hal::host {
 namespace {
 
-// Collects the first broken rule; the rest are then only evaluated, never reported.
-class Checker {
- public:
-  void require(bool holds, const char* key, std::string what, std::string remedy) {
-    if (holds || !error_.where.empty()) return;
-    error_ = {.where = key, .what = std::move(what), .remedy = std::move(remedy)};
-  }
-  void within(double value, const char* key, double least, double most) {
-    require(value >= least && value <= most, key, "is " + text(value) + ", out of its range",
-            "give a number from " + text(least) + " to " + text(most) + " in SI units");
-  }
-  void positive(double value, const char* key, double most) {
-    require(value > 0.0 && value <= most, key, "is " + text(value) + ", out of its range",
-            "give a number above 0, at most " + text(most) + ", in SI units");
-  }
-  void profile(const Profile& profile, const char* key, double least, double most) {
-    require(profile.sound(), key, "is not a profile",
-            "give at least one point, abscissae ascending, two equal ones for a step");
-    for (const ProfilePoint& point : profile.points()) within(point.value, key, least, most);
-  }
-  [[nodiscard]] std::expected<void, InputError> result() const {
-    if (error_.where.empty()) return {};
-    return std::unexpected{error_};
-  }
-
- private:
-  static std::string text(double value) {
-    std::array<char, 32> buffer{};
-    std::snprintf(buffer.data(), buffer.size(), "%.6g", value);
-    return buffer.data();
-  }
-  InputError error_;
-};
+using Checker = ConfigChecker;
 
 constexpr double kMost = 1e9;
 
@@ -109,35 +76,6 @@ void check_mechanics(Checker& c, const SimulatedMachineConfig& m) {
   }
 }
 
-void check_process(Checker& c, const ProcessConfig& p, const FeedConfig& f) {
-  c.within(p.specific_force_n_m2, "process.specific_force_n_m2", 0.0, 1e12);
-  c.positive(p.nominal_feed_m_rev, "process.nominal_feed_m_rev", 1.0);
-  c.within(p.exponent, "process.exponent", 0.1, 2.0);
-  c.within(p.lag_s, "process.lag_s", 0.0, 100.0);
-  c.profile(p.depth_m, "process.depth_m", 0.0, 0.1);
-  c.profile(p.diameter_m, "process.diameter_m", 1e-4, 100.0);
-  c.profile(p.wear_ratio, "process.wear_ratio", 0.0, 100.0);
-  for (const HardSpot& spot : p.hard_spots) {
-    c.require(spot.end_m > spot.begin_m, "process.hard_spots", "ends before it begins",
-              "give end_m above begin_m");
-    c.within(spot.factor, "process.hard_spots", 0.0, 100.0);
-  }
-  c.within(p.slots_per_turn, "process.slots_per_turn", 0.0, 1000.0);
-  c.within(p.slot_ratio, "process.slot_ratio", 0.0, 1.0);
-  c.within(f.start_s, "feed.start_s", 0.0, kMost);
-  c.within(f.feed_m_rev, "feed.feed_m_rev", 0.0, 1.0);
-  c.within(f.feed_m_s, "feed.feed_m_s", 0.0, 10.0);
-  c.require(!(f.feed_m_rev > 0.0 && f.feed_m_s > 0.0), "feed.feed_m_s",
-            "and feed.feed_m_rev are both given", "give the feed per turn or the feed per time");
-  c.within(f.length_m, "feed.length_m", 0.0, 1e4);
-  c.within(f.cutting_move_start_m, "feed.cutting_move_start_m", 0.0, 1e4);
-  c.within(f.latency_s, "feed.latency_s", 0.0, 10.0);
-  c.within(f.scan_s, "feed.scan_s", 0.0, 10.0);
-  c.within(f.scan_jitter_s, "feed.scan_jitter_s", 0.0, f.scan_s);
-  c.within(f.lag_s, "feed.lag_s", 0.0, 10.0);
-  c.within(f.initial_override_pct, "feed.initial_override_pct", 0.0, 254.0);
-}
-
 void check_channel(Checker& c, const ChannelConfig& channel, const char* key) {
   c.require(std::isfinite(channel.gain) && std::isfinite(channel.offset), key,
             "has a gain or an offset that is no number", "give finite numbers");
@@ -197,7 +135,7 @@ std::expected<void, InputError> SimulatedMachineConfig::check() const {
   check_motor(c, motor);
   check_drive(c, inverter, drive);
   check_mechanics(c, *this);
-  check_process(c, process, feed);
+  check_cut(c, process, feed);
   check_sensors(c, *this);
   return c.result();
 }
