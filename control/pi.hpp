@@ -18,6 +18,7 @@
 #include <type_traits>
 
 #include "control/law.hpp"
+#include "control/velocity_form.hpp"
 
 namespace cutforce::control {
 
@@ -71,24 +72,7 @@ class PiController {
   }
 
   [[nodiscard]] constexpr Output step(const Input& input) noexcept {
-    const float error_n = input.force_reference_n - input.force_n;  // (C1)
-    const float base_pct =
-        std::clamp(state_.wanted_pct, input.override_applied_pct - input.override_tolerance_pct,
-                   input.override_applied_pct + input.override_tolerance_pct);  // (C2)
-    switch (input.mode) {
-      case LawMode::kActive:
-        state_.wanted_pct = std::clamp(wanted_pct(base_pct, error_n), -kFarPct, kFarPct);
-        state_.error_n = error_n;
-        return law_answer(state_.wanted_pct);
-      case LawMode::kTrack:
-        state_.error_n = error_n;
-        break;
-      case LawMode::kHold:
-        break;
-    }
-    // Following: P1 (4) from here with E(i-1) = E(i) moves by the integral part alone.
-    state_.wanted_pct = base_pct;
-    return law_answer(input.override_applied_pct);
+    return law_answer(velocity_form_pct(state_, input, gains_));
   }
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
@@ -96,25 +80,15 @@ class PiController {
 
  private:
   static constexpr float kGainLimit = 1e4F;
-  static constexpr float kFarPct = 1e4F;  // far beyond every limit, and finite
 
   explicit constexpr PiController(const Config& config) noexcept
-      : proportional_pct_n_(config.proportional_pct_n),
-        integral_pct_n_(config.integral_pct_n_s * config.period_s),
-        // The velocity form is the position form that gives way at once.
-        tracking_ratio_(config.form == Form::kVelocity ? 1.0F
-                                                       : config.period_s / config.tracking_s) {}
+      : gains_{.proportional_pct_n = config.proportional_pct_n,
+               .integral_pct_n = config.integral_pct_n_s * config.period_s,
+               // The velocity form is the position form that gives way at once.
+               .tracking_ratio =
+                   config.form == Form::kVelocity ? 1.0F : config.period_s / config.tracking_s} {}
 
-  // (C3), (C4) in one: I(i-1) = U(i-1) - Kp E(i-1) needs no state of its own.
-  [[nodiscard]] constexpr float wanted_pct(float base_pct, float error_n) const noexcept {
-    const float before_pct = state_.wanted_pct + tracking_ratio_ * (base_pct - state_.wanted_pct);
-    return before_pct + proportional_pct_n_ * (error_n - state_.error_n) +
-           integral_pct_n_ * error_n;
-  }
-
-  float proportional_pct_n_;
-  float integral_pct_n_;
-  float tracking_ratio_;
+  VelocityGains gains_;
   State state_{};
 };
 
