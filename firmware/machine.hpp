@@ -20,7 +20,16 @@ enum class EstimatorName : std::uint8_t {
   kFused,
   kDynamometer
 };
-enum class ControllerName : std::uint8_t { kNone, kPi };
+enum class ControllerName : std::uint8_t {
+  kNone,
+  kPi,
+  kPid,
+  kPoleAssignment,
+  kMrac,
+  kVariableGain,
+  kFuzzy,
+  kPredictive
+};
 enum class PowerMode : std::uint8_t { kDotProduct, kTwoWattmeter, kFixedPowerFactor };
 enum class SpeedSource : std::uint8_t { kRotor, kSynchronous, kSlip };
 enum class SwitchMode : std::uint8_t { kAbsolute, kPositiveOnly };
@@ -77,9 +86,10 @@ struct Machine {
   std::array<float, 3> load_friction_1_nm;         // g(omega), P3 (8)
 
   // [spindle] and workpiece
-  float gear_ratio;            // motor turns per spindle turn
-  float workpiece_diameter_m;  // or tool diameter (milling); 0: not given
-  float minimum_speed_rad_s;   // below it there is no estimate
+  float gear_ratio;              // motor turns per spindle turn
+  float workpiece_diameter_m;    // or tool diameter (milling); 0: not given
+  float minimum_speed_rad_s;     // below it there is no estimate
+  float programmed_speed_rad_s;  // motor speed that the program asks for; 0: not given
 
   // [power_meter]
   float meter_scale_ratio;
@@ -118,8 +128,51 @@ struct Machine {
   float cut_threshold_n;  // above it the tool is in the cut
   OverrideCode override_code;
 
+  // [control] the process, as the laws are told
+  float process_gain_n_pct;
+  float process_gain_least_n_pct;
+  float process_gain_most_n_pct;
+  float override_latency_s;
+  float override_latency_sigma_s;
+  float feed_lag_s;
+  float process_lag_s;
+  float force_lag_s;
+  float feed_exponent_ratio;
+
+  // [control] one law each
+  bool pi_supervise;
+  float pid_proportional_pct_n;
+  float pid_integral_time_s;
+  float pid_derivative_time_s;
+  float pid_derivative_filter_ratio;
+  float pole_assignment_pole_1_ratio;
+  float pole_assignment_pole_2_ratio;
+  float pole_assignment_learning_ratio;
+  float mrac_model_time_s;
+  float mrac_adaptation_hz;
+  float variable_gain_open_loop_1_s;
+  float variable_gain_smoothing_s;
+  float fuzzy_error_range_n;
+  float fuzzy_change_range_n;
+  float fuzzy_step_range_pct;
+  float predictive_noise_ratio;
+  float predictive_noise_n;
+  float predictive_jump_ratio;
+  float predictive_calm_horizon_s;
+  float predictive_recovery_1_s;
+  float predictive_caution_ratio;
+  bool predictive_learns;
+  bool predictive_finds_latency;
+
   friend constexpr bool operator==(const Machine&, const Machine&) noexcept = default;
 };
 static_assert(std::is_trivially_copyable_v<Machine>);
+
+// Time between two estimates. One a sample, where a dynamometer is slower than the usual period.
+[[nodiscard]] constexpr float estimate_period_s(const Machine& m) noexcept {
+  const bool slow = m.estimator == EstimatorName::kDynamometer && m.sample_rate_hz > 0.0F &&
+                    m.estimate_period_s * m.sample_rate_hz < 0.999F;
+  return slow && m.estimate_period_s > 0.0F ? 1.0F / m.sample_rate_hz : m.estimate_period_s;
+}
 
 }  // namespace cutforce::firmware
