@@ -92,7 +92,7 @@ namespace cutforce::firmware::detail {
       number<&M::mrac_model_time_s>(0x0738, "mrac_model_time_s", "s", {0.01F, 10}, 0.3F, 0.3F,
                                     kIdle,
                                     "Time constant with which mrac wants the force to follow."),
-      number<&M::mrac_adaptation_hz>(0x0739, "mrac_adaptation_hz", "1/s", {0.001F, 1000}, 2, 2,
+      number<&M::mrac_adaptation_hz>(0x0739, "mrac_adaptation_hz", "1/s", {0.001F, 1000}, 4, 4,
                                      kIdle,
                                      "Rate at which mrac adapts; below 1 / control_period_s."),
       number<&M::variable_gain_open_loop_1_s>(
