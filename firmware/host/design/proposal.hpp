@@ -9,7 +9,7 @@
 //   pole_assignment poles e^{-3T/s} and 0: integral alone, P1's case III
 //   variable_gain   K_open = 3 / s
 //   fuzzy           output gain; around zero the table is K_P = G_u/G_de, K_I T = G_u/G_e
-//   theta = latency + T/2 + feed and sensor lags: what is not tau                        (C90)-(C94)
+//   theta = latency + T/2 + feed and sensor lags: what is not tau (C90)-(C94)
 //
 // mrac and predictive are not linear; their times follow from the wish directly, and a run of the
 // simulated machine shows what comes of it (tuning_run.hpp).

@@ -37,4 +37,22 @@ LoopStep loop_step(const DiscretePlant& plant, const DiscreteController& control
   return step;
 }
 
+double highest_gain(const DiscretePlant& plant, const DiscreteController& controller) {
+  const auto stable = [&](double ratio) {
+    return is_stable(closed_loop(
+        {product(plant.numerator, {ratio}), plant.denominator, plant.period_s}, controller));
+  };
+  if (!stable(1.0)) return 0.0;
+  // Steps so small that no band of instability is jumped over, then halves.
+  double low = 1.0;
+  double high = 1.05;
+  while (high < 1e3 && stable(high)) low = high, high *= 1.05;
+  if (high >= 1e3) return std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 50; ++i) {
+    const double middle = 0.5 * (low + high);
+    (stable(middle) ? low : high) = middle;
+  }
+  return low * static_gain(plant);
+}
+
 }  // namespace cutforce::firmware::host

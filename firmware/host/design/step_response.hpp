@@ -1,4 +1,4 @@
-// What a linear loop does when it is asked for another force, at its ticks.
+// What a linear loop does when it is asked for another force, at its ticks, and what gain it bears.
 #pragma once
 
 #include <cstddef>
@@ -23,5 +23,10 @@ struct LoopStep {
 // Reference stepped by 1, until `duration_s`.
 [[nodiscard]] LoopStep loop_step(const DiscretePlant& plant, const DiscreteController& controller,
                                  double duration_s);
+
+// Largest gain up to which the loop is stable for every smaller one too, by Schur and Cohn's test
+// from the present gain on upward; infinity where a thousand times the gain is stable, 0 where the
+// loop is not stable as it is.
+[[nodiscard]] double highest_gain(const DiscretePlant& plant, const DiscreteController& controller);
 
 }  // namespace cutforce::firmware::host
