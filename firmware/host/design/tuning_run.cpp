@@ -58,13 +58,17 @@ ForceMachineConfig simulated(const LoopPlant& plant, const Wish& wish, double ga
   return config;
 }
 
-StepFigures figures(const TuningRun& run, double reference_n, double from_s, double to_s) {
+// Within 5 %, or within one and a half steps of the override where those are coarser: of a heavy
+// cut at a low override a step of 1 % is 5 % of the force.
+StepFigures figures(const TuningRun& run, double reference_n, double rest_pct, double from_s,
+                    double to_s) {
   StepFigures out{.overshoot_ratio = 0.0, .settling_s = 0.0};
+  const double band = std::max(0.05, 1.5 / rest_pct);
   for (std::size_t k = 0; k < run.time_s.size(); ++k) {
     if (run.time_s[k] <= from_s || run.time_s[k] > to_s) continue;
     const double error = run.force_n[k] / reference_n - 1.0;
     out.overshoot_ratio = std::max(out.overshoot_ratio, error);
-    if (std::abs(error) > 0.05) out.settling_s = run.time_s[k] - from_s;
+    if (std::abs(error) > band) out.settling_s = run.time_s[k] - from_s;
   }
   // Still outside in the last tenth: it has not settled, it was passing through.
   if (out.settling_s > 0.9 * (to_s - from_s))
@@ -129,8 +133,10 @@ TuningRun tuning_run(const Machine& machine, const LoopPlant& plant, const Wish&
       run.override_pct.push_back(sent_pct);
     }
   }
-  run.approach = figures(run, plant.reference_n, 0.0, deeper_s);
-  run.deeper = figures(run, plant.reference_n, deeper_s, 2.0 * deeper_s);
+  const double rest_pct = working_pct(plant, gain_ratio);
+  run.approach = figures(run, plant.reference_n, rest_pct, 0.0, deeper_s);
+  run.deeper = figures(run, plant.reference_n, working_pct(plant, kDeeper * gain_ratio), deeper_s,
+                       2.0 * deeper_s);
   return run;
 }
 

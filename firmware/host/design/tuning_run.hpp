@@ -13,7 +13,7 @@ namespace cutforce::firmware::host {
 
 struct StepFigures {
   double overshoot_ratio;  // above the reference
-  double settling_s;       // from then on within 5 %; infinity where it never is
+  double settling_s;       // from then on within 5 %, or what rounding leaves; infinity: never
 };
 
 struct TuningRun {
