@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <string>
 
 #include "firmware/host/design/design_text.hpp"
@@ -78,6 +79,20 @@ void add_fit(const Identification& found, Json& plots) {
                                   .reference_pct = p.override_pct},
                                  test.time_s);
   for (double& y : model) y *= p.force_n;
+  std::vector<double> override_pct;
+  std::size_t at = 0;
+  for (const double row_s : test.time_s) {
+    while (at + 1 < test.changes.size() && test.changes[at + 1].time_s <= row_s) ++at;
+    override_pct.push_back(test.changes[at].override_pct);
+  }
+  plots.push_back({{"holder", "steps"},
+                   {"group", "fit"},
+                   {"unit", "%"},
+                   {"height", 120},
+                   {"time", thinned(test.time_s, n)},
+                   {"curves", Json::array({Json{{"ink", "orange"},
+                                                {"stepped", true},
+                                                {"values", thinned(override_pct, n)}}})}});
   plots.push_back({{"holder", "fit"},
                    {"group", "fit"},
                    {"unit", "N"},
@@ -105,7 +120,8 @@ std::string identified(const Identification& found) {
           "of the force's variance; residual " + brief(p.residual_n) + " N");
   return "<section><h2>The step test and the plant found in it</h2>\n"
          "<div class=\"key\"><span><i data-ink=\"truth\"></i>Recorded force</span>"
-         "<span><i data-ink=\"blue\"></i>Identified plant</span></div>\n"
+         "<span><i data-ink=\"blue\"></i>Identified plant</span>"
+         "<span><i data-ink=\"orange\"></i>Override</span></div>\n"
          "<div class=\"plot\" id=\"fit\" role=\"img\" aria-label=\"Recorded force and "
          "model\"></div>\n" +
          table(rows) + "</section>\n";
@@ -159,32 +175,62 @@ void add_linear(const LinearLoop& loop, const std::string& id, double period_s, 
                                     values.begin() + static_cast<std::ptrdiff_t>(count));
     Json out{{"holder", id + end}, {"group", id},        {"unit", ""},  {"height", kHeight},
              {"from_s", 0.0},      {"step_s", period_s}, {"level", 1.0}};
-    out["curves"] = {{{"ink", "blue"}, {"stepped", stepped}, {"values", thinned(shown, 1)}}};
+    out["curves"] =
+        Json::array({Json{{"ink", "blue"}, {"stepped", stepped}, {"values", thinned(shown, 1)}}});
     plots.push_back(std::move(out));
   };
   plot("f", loop.step.force, false);
   plot("u", loop.step.override, true);
 }
 
-std::string settled(const StepFigures& step) {
-  return "+" + brief(100.0 * step.overshoot_ratio) + " %, " +
-         (std::isinf(step.settling_s) ? "never settles" : brief(step.settling_s) + " s");
+std::string or_any(double value, const char* unit) {
+  return std::isinf(value) ? "any" : brief(value) + unit;
 }
 
-std::string facts(const TriedProposal& tried) {
-  std::string rows;
-  for (const auto& loop : tried.proposal.linear) {
-    rows += row("Margins", "", margin_text(loop.margins));
-    rows += row("Highest gain", brief(loop.highest_gain_n_pct) + " N/%", "of the linear loop");
-    rows += row("Linear step", settled({loop.step.overshoot_ratio, loop.step.settling_s}),
-                "of the reference");
+std::string margin_table(const LinearLoop& loop) {
+  const auto& m = loop.margins;
+  const double degrees = m.phase_rad * 180.0 / std::numbers::pi;
+  const auto settles_s = loop.step.settling_s;
+  return table(row("Gain margin", or_any(m.gain_ratio, " x"),
+                   "stable up to " + or_any(loop.highest_gain_n_pct, " N/%")) +
+               row("Phase margin", or_any(degrees, " deg"), "") +
+               row("Delay margin", or_any(m.delay_s, " s"), "of dead time more") +
+               row("Modulus margin", brief(m.modulus_ratio), "from -1; half and more is good") +
+               row("Step of the reference",
+                   std::isinf(settles_s) ? "never settles" : brief(settles_s) + " s",
+                   "linear, " + brief(100.0 * loop.step.overshoot_ratio) + " % overshoot"));
+}
+
+std::string cell(const std::string& text) {
+  return "<td class=\"number\">" + escaped(text) + "</td>";
+}
+
+std::string step_cells(const StepFigures& step) {
+  return cell(brief(100.0 * step.overshoot_ratio) + " %") +
+         cell(std::isinf(step.settling_s) ? "never" : brief(step.settling_s) + " s");
+}
+
+std::string run_table(const TriedProposal& tried) {
+  std::string out =
+      "<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">Simulated</th>"
+      "<th scope=\"col\" class=\"number\">Overshoot from 80 %</th>"
+      "<th scope=\"col\" class=\"number\">Settles in</th>"
+      "<th scope=\"col\" class=\"number\">Peak, half as deep again</th>"
+      "<th scope=\"col\" class=\"number\">Settles in</th></tr></thead><tbody>\n";
+  for (std::size_t k = 0; k < tried.runs.size(); ++k) {
+    const auto& run = tried.runs[k];
+    out += std::string("<tr><th scope=\"row\">") + kInks[k].label + "</th>" +
+           (run.rest_pct > kRunCeilingPct ? "<td class=\"number note\" colspan=\"2\">would need " +
+                                                brief(run.rest_pct) + " %: at the ceiling</td>"
+                                          : step_cells(run.approach)) +
+           step_cells(run.deeper) + "</tr>\n";
   }
-  for (std::size_t k = 0; k < tried.runs.size(); ++k)
-    rows += row(kInks[k].label, settled(tried.runs[k].approach),
-                "then half as deep again: " + settled(tried.runs[k].deeper));
-  if (!tried.runs.empty())
-    rows += row("Settles up to", brief(tried.settles_up_to) + " x", "the gain, of 8 tried");
-  return table(rows);
+  return out + "</tbody></table></div>\n<p class=\"note\">" +
+         (tried.settles_up_to > 0.0 ? "Settles up to " + brief(tried.settles_up_to) +
+                                          " times the gain and half as deep again; 8 times was "
+                                          "the most that was tried."
+                                    : "Does not settle even at the plant's own gain.") +
+         "</p>\n";
 }
 
 std::string proposal_section(const TriedProposal& tried, const Tuning& tuning,
@@ -201,8 +247,9 @@ std::string proposal_section(const TriedProposal& tried, const Tuning& tuning,
   if (!tried.runs.empty() || !p.linear.empty())
     out += "<div class=\"pair\">" + holder(id + "f", "Cutting force") +
            holder(id + "u", "Override") + "</div>\n";
-  out += "<div class=\"facts\">" + facts(tried) + "<pre class=\"toml\">" +
-         escaped(toml_snippet(p, tuning)) + "</pre></div>\n";
+  if (!tried.runs.empty()) out += run_table(tried);
+  out += "<div class=\"facts\"><pre class=\"toml\">" + escaped(toml_snippet(p, tuning)) + "</pre>" +
+         (p.linear.empty() ? std::string() : margin_table(p.linear.front())) + "</div>\n";
   return out + warnings(p.warnings) + "</section>\n";
 }
 

@@ -97,9 +97,8 @@ std::optional<Machine> tuned_machine(const Proposal& proposal, const LoopPlant& 
   machine.force_reference_n = reference_n;
   machine.force_limit_n = 4.0F * reference_n;
   machine.cut_threshold_n = 0.12F * reference_n;
-  // As wide as the byte goes: it is the gains that are tried.
-  machine.override_floor_pct = 5.0F;
-  machine.override_ceiling_pct = 254.0F;
+  machine.override_floor_pct = static_cast<float>(kRunFloorPct);
+  machine.override_ceiling_pct = static_cast<float>(kRunCeilingPct);
   if (!check(machine) || !make_loop(machine)) return {};
   return machine;
 }
@@ -115,10 +114,11 @@ TuningRun tuning_run(const Machine& machine, const LoopPlant& plant, const Wish&
   const auto initial_pct = static_cast<double>(own.override_initial_pct);
   auto cut = ForceMachine::make(simulated(plant, wish, gain_ratio, initial_pct, deeper_s)).value();
   TuningRun run{.gain_ratio = gain_ratio,
-                .time_s = {},
-                .force_n = {},
-                .override_pct = {},
+                .time_s = {0.0},
+                .force_n = {cut.truth().force_n},
+                .override_pct = {initial_pct},
                 .deeper_s = deeper_s,
+                .rest_pct = working_pct(plant, gain_ratio),
                 .approach = {},
                 .deeper = {}};
   double sent_pct = initial_pct;
@@ -133,8 +133,7 @@ TuningRun tuning_run(const Machine& machine, const LoopPlant& plant, const Wish&
       run.override_pct.push_back(sent_pct);
     }
   }
-  const double rest_pct = working_pct(plant, gain_ratio);
-  run.approach = figures(run, plant.reference_n, rest_pct, 0.0, deeper_s);
+  run.approach = figures(run, plant.reference_n, run.rest_pct, 0.0, deeper_s);
   run.deeper = figures(run, plant.reference_n, working_pct(plant, kDeeper * gain_ratio), deeper_s,
                        2.0 * deeper_s);
   return run;

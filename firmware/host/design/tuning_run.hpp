@@ -22,6 +22,7 @@ struct TuningRun {
   std::vector<double> force_n;
   std::vector<double> override_pct;
   double deeper_s;       // when the cut becomes deeper
+  double rest_pct;       // override that the force needs before that
   StepFigures approach;  // from 80 % of the override
   StepFigures deeper;    // half as deep again
 };
@@ -30,6 +31,10 @@ struct TuningRun {
 // this version of the firmware has no such controller, or refuses a value.
 [[nodiscard]] std::optional<Machine> tuned_machine(const Proposal& proposal, const LoopPlant& plant,
                                                    const Wish& wish);
+
+// Override limits of these runs: as wide as the byte goes, it is the gains that are tried.
+inline constexpr double kRunFloorPct = 5.0;
+inline constexpr double kRunCeilingPct = 254.0;
 
 [[nodiscard]] TuningRun tuning_run(const Machine& machine, const LoopPlant& plant, const Wish& wish,
                                    double gain_ratio);

@@ -65,6 +65,13 @@ std::string run_name(const TuningRun& run) {
   return run.gain_ratio < 1.0 ? "half the gain" : "twice the gain";
 }
 
+std::string run_text(const TuningRun& run) {
+  const std::string approach = run.rest_pct > kRunCeilingPct
+                                   ? "would need " + brief(run.rest_pct) + " %: at the ceiling"
+                                   : step_text(run.approach);
+  return "from 80 %: " + approach + "; half as deep again: " + step_text(run.deeper);
+}
+
 Json finite(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
 
 Json step_json(const StepFigures& step) {
@@ -118,6 +125,7 @@ Json proposal_json(const TriedProposal& tried, const Tuning& tuning) {
   out["simulated"] = Json::array();
   for (const auto& run : tried.runs)
     out["simulated"].push_back({{"gain_ratio", run.gain_ratio},
+                                {"rest_override_pct", run.rest_pct},
                                 {"approach", step_json(run.approach)},
                                 {"half_as_deep_again", step_json(run.deeper)}});
   if (!tried.runs.empty()) out["settles_up_to_gain_ratio"] = tried.settles_up_to;
@@ -137,14 +145,12 @@ std::string proposal_text(const TriedProposal& tried, const Tuning& tuning) {
                                          brief(loop.margins.gain_ratio) + " times the plant's)");
     out += row("linear step", step_text({loop.step.overshoot_ratio, loop.step.settling_s}));
   }
-  for (const auto& run : tried.runs)
-    out += row(run_name(run), "from 80 % of the override: " + step_text(run.approach) +
-                                  "; half as deep again: " + step_text(run.deeper));
+  for (const auto& run : tried.runs) out += row(run_name(run), run_text(run));
   if (!tried.runs.empty())
-    out +=
-        row("settles", tried.settles_up_to > 0.0
-                           ? "up to " + brief(tried.settles_up_to) + " times the gain, of 8 tried"
-                           : std::string("not even at the plant's own gain"));
+    out += row("settles", tried.settles_up_to > 0.0
+                              ? "up to " + brief(tried.settles_up_to) +
+                                    " times the gain and half as deep again (8 times tried)"
+                              : std::string("not even at the plant's own gain"));
   for (const auto& warning : p.warnings) out += row("warning", warning);
   return out;
 }
