@@ -64,8 +64,8 @@ TEST(Proposal, HasTheMarginsOfAnIntegralOnADeadTime) {
 
 // Both ways to the largest gain agree: where the locus cuts the axis, and Schur and Cohn.
 TEST(Proposal, SettlesAsWishedAndKeepsItsMargins) {
-  for (const double latency_s : {0.0, 0.03, 0.05, 0.12}) {
-    for (const double lag_s : {0.0, 0.05, 0.1, 0.3}) {
+  for (const double latency_s : {0.0, 0.035, 0.12}) {
+    for (const double lag_s : {0.0, 0.1, 0.3}) {
       LoopPlant plant = kLathe;
       plant.latency_s = latency_s;
       plant.lag_s = lag_s;

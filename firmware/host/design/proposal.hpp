@@ -6,10 +6,12 @@
 //   pi              K_P = tau / (k (lambda + theta)),  K_I = K_P / min(tau, 4 (lambda + theta))
 //   pid             K_P = (tau + theta/2) / (k (lambda + theta/2)), T_I = tau + theta/2,
 //                   T_D = tau theta / (2 tau + theta), filter N = 10
-//   pole_assignment poles e^{-3T/s} and 0: integral alone, P1's case III
+//   pole_assignment poles z = e^{-3T/s} and -z/4, in the proportion of P1's case I, or 0: its
+//                   case III, integral alone
 //   variable_gain   K_open = 3 / s
-//   fuzzy           output gain; around zero the table is K_P = G_u/G_de, K_I T = G_u/G_e
-//   theta = latency + T/2 + feed and sensor lags: what is not tau (C90)-(C94)
+//   fuzzy           step range; around rest the law is K_P = c G_u/G_de, K_I T = c G_u/G_e, with c
+//                   measured on the law itself
+//   theta = latency + T/2 + feed and sensor lags: what is not tau
 //
 // mrac and predictive are not linear; their times follow from the wish directly, and a run of the
 // simulated machine shows what comes of it (tuning_run.hpp).
@@ -37,6 +39,8 @@ struct LoopPlant {
 
   // F = reference (U / this)^exponent, so that the gain is exponent reference / this.
   [[nodiscard]] double override_pct() const { return exponent * reference_n / gain_n_pct; }
+  // Force over override there, what a law that learns the gain sees: the slope over the exponent.
+  [[nodiscard]] double secant_n_pct() const { return reference_n / override_pct(); }
   [[nodiscard]] DiscretePlant discrete(double period_s) const;
 };
 

@@ -46,17 +46,32 @@ void mind_uncertainty(Proposal& proposal, const IdentifiedPlant& plant) {
     proposal.warnings.push_back("the delay margin does not cover the dead time's own uncertainty");
 }
 
+// Where no linear loop says so before, the run says whether the wish is met.
+void mind_simulation(TriedProposal& tried, const Wish& wish) {
+  const double settles_s = tried.runs[1].approach.settling_s;
+  if (!(tried.settles_up_to >= 1.0)) {
+    tried.proposal.warnings.push_back("in simulation it does not come to rest");
+    tried.proposal.wish_met = false;
+  } else if (tried.proposal.linear.empty() && settles_s > wish.settling_s) {
+    if (tried.proposal.wish_met)
+      tried.proposal.warnings.push_back("settling within " + brief(wish.settling_s) +
+                                        " s is not reached: in simulation it takes " +
+                                        brief(settles_s) + " s");
+    tried.proposal.wish_met = false;
+  }
+}
+
 TriedProposal tried(Proposal proposal, const LoopPlant& plant, const Wish& wish) {
   TriedProposal out{.proposal = std::move(proposal), .runs = {}, .settles_up_to = 0.0};
   const auto machine = tuned_machine(out.proposal, plant, wish);
   if (!machine) {
-    out.proposal.warnings.push_back(
-        "not simulated: this version of the firmware does not take these values");
+    out.proposal.warnings.push_back("not simulated: a machine file would refuse these values");
     return out;
   }
   for (const double ratio : {0.5, 1.0, 2.0})
     out.runs.push_back(tuning_run(*machine, plant, wish, ratio));
   out.settles_up_to = settles_up_to(*machine, plant, wish);
+  mind_simulation(out, wish);
   return out;
 }
 

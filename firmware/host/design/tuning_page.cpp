@@ -123,7 +123,8 @@ std::string identified(const Identification& found) {
          "<span><i data-ink=\"blue\"></i>Identified plant</span>"
          "<span><i data-ink=\"orange\"></i>Override</span></div>\n"
          "<div class=\"plot\" id=\"fit\" role=\"img\" aria-label=\"Recorded force and "
-         "model\"></div>\n" +
+         "model\"></div>\n"
+         "<div class=\"plot\" id=\"steps\" role=\"img\" aria-label=\"Override\"></div>\n" +
          table(rows) + "</section>\n";
 }
 
