@@ -26,9 +26,9 @@ constexpr Wish kWish{.settling_s = 1.0, .period_s = 0.05};
 
 // Whatever the plant: every key is one of the table's, and its value within the range there.
 TEST(TuningRun, ProposesWhatTheFirmwareTakes) {
-  for (const double latency_s : {0.0, 0.035, 0.3}) {
-    for (const double lag_s : {0.0, 0.1, 0.5}) {
-      for (const double settling_s : {0.2, 1.0, 10.0}) {
+  for (const double latency_s : {0.0, 0.3}) {
+    for (const double lag_s : {0.0, 0.1}) {
+      for (const double settling_s : {0.2, 10.0}) {
         LoopPlant plant = kLathe;
         plant.latency_s = latency_s;
         plant.lag_s = lag_s;

@@ -64,7 +64,8 @@ Member pole_member(double slow, double fast, const LoopPlant& plant) {
   return {{{"pole_assignment_pole_1_ratio", number(z1)},
            {"pole_assignment_pole_2_ratio", number(z2)},
            usual_gain(plant)},
-          pi_law(gains.proportional, gains.integral_tick)};
+          pi_law(gains.proportional, gains.integral_tick),
+          z1 <= 0.98};
 }
 
 // P3 (11): integral alone, over the learned gain. The law itself asks for K_open T < 1/n with n

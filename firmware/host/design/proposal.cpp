@@ -25,7 +25,6 @@ LinearLoop analysed(const DiscretePlant& plant, DiscreteController controller, d
       .controller = std::move(controller), .margins = {}, .highest_gain_n_pct = 0.0, .step = {}};
   loop.margins = margins(plant, loop.controller);
   loop.step = loop_step(plant, loop.controller, duration_s);
-  loop.highest_gain_n_pct = highest_gain(plant, loop.controller);
   return loop;
 }
 
@@ -73,9 +72,9 @@ std::optional<Proposal> best_of(std::string_view controller, const NamedFamily& 
     const double settles_s = loop.step.settling_s;
     if (fastest && !(settles_s < fastest->linear[0].step.settling_s)) continue;
     fastest = proposal_of(controller, family.rule, std::move(member), std::move(loop));
-    if (settles_s <= wish.settling_s) return fastest;
+    if (settles_s <= wish.settling_s) break;
   }
-  if (!fastest) return {};
+  if (!fastest || fastest->linear[0].step.settling_s <= wish.settling_s) return fastest;
   too_fast(*fastest, wish, r, fastest->linear[0].step.settling_s);
   return fastest;
 }
@@ -175,6 +174,11 @@ std::vector<Proposal> propose(std::string_view controller, const LoopPlant& plan
     else if (!proposals.empty())
       proposals.front().warnings.push_back(
           "Ziegler and Nichols' rule is left out: the loop would not be stable");
+  }
+  const DiscretePlant discrete = plant.discrete(wish.period_s);
+  for (auto& proposal : proposals) {
+    for (auto& loop : proposal.linear)
+      loop.highest_gain_n_pct = highest_gain(discrete, loop.controller);
   }
   return proposals;
 }
