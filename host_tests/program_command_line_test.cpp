@@ -12,8 +12,8 @@ namespace {
 TEST(Program, HasHelpWithExamplesForEachCommand) {
   const auto all = cutforce("--help");
   EXPECT_EQ(all.exit_status, 0);
-  for (const std::string command :
-       {"demo", "simulate", "replay", "evaluate", "check", "report", "lockstep", "convert"}) {
+  for (const std::string command : {"demo", "simulate", "replay", "evaluate", "check", "report",
+                                    "lockstep", "convert", "tune"}) {
     SCOPED_TRACE(command);
     EXPECT_NE(all.output.find("\n  " + command + " "), std::string::npos) << all.output;
     const auto one = cutforce(command + " --help");
