@@ -69,7 +69,7 @@ concept Law = std::is_trivially_copyable_v<L> && std::is_trivially_copyable_v<ty
   { law.step(input) }
   noexcept->std::same_as<LawOutput>;
   { fixed.state() }
-  noexcept->std::same_as<const typename L::State&>;
+  noexcept->std::convertible_to<typename L::State>;
   { law.restore(state) }
   noexcept;
 };
