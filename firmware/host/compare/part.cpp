@@ -182,6 +182,12 @@ Part random_part(std::uint64_t seed) {
   return part;
 }
 
+Part long_cut(double depth_m) {
+  Part part = part_of("long", "One depth", Profile(depth_m));
+  part.machine.feed.length_m = 1e3;
+  return part;
+}
+
 Part in_surroundings(Part part, Surroundings surroundings, std::uint64_t seed) {
   ForceMachineConfig& m = part.machine;
   m.seed = seed;

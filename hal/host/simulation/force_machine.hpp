@@ -77,7 +77,6 @@ class ForceMachine {
   [[nodiscard]] ProcessInput process_input() noexcept;
 
   ForceMachineConfig config_;
-  ProfileCursor speed_{};  // before what it is read for
   std::uint32_t steps_per_sample_;
   std::uint64_t steps_ = 0;
   double turns_ = 0.0;
