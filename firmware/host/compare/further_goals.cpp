@@ -1,0 +1,103 @@
+#include <algorithm>
+#include <cmath>
+
+#include "firmware/host/compare/goals.hpp"
+
+namespace cutforce::firmware::host {
+namespace {
+
+constexpr std::uint64_t kHeldBack = 8;  // random parts that nobody tuned to
+constexpr double kLong_s = 120.0;
+constexpr double kSettled_s = 3.0;
+
+// A long cut of one depth, from 3 s on.
+struct LongFigures {
+  double changes_1_s;
+  double mean_error_ratio;
+  double spread_ratio;
+  double retreats_1_min;  // falls of the override by more than 15 % that nothing has called for
+};
+
+LongFigures long_figures(const Contender& subject) {
+  Part part = in_surroundings(long_cut(1e-3), Surroundings::kNoise, 1);
+  part.time_limit_s = kLong_s;
+  double last_pct = -1.0;
+  double sum_n = 0.0;
+  double square = 0.0;
+  double count = 0.0;
+  double changes = 0.0;
+  double retreats = 0.0;
+  const Trial trial{};
+  const double gain = part.machine.sensor.gain_ratio;
+  [[maybe_unused]] const auto metrics =
+      cut_part(subject, part, trial, [&](const hal::host::ForceMachine& machine) {
+        if (machine.time_s() < kSettled_s) return;
+        const auto truth = machine.truth();
+        const double force_n = gain * truth.force_n;
+        sum_n += force_n;
+        square += force_n * force_n;
+        count += 1.0;
+        if (last_pct >= 0.0 && truth.override_pct != last_pct) changes += 1.0;
+        if (truth.override_pct < 0.85 * last_pct) retreats += 1.0;
+        last_pct = truth.override_pct;
+      });
+  const double watched_s = kLong_s - kSettled_s;
+  const double mean_n = sum_n / count;
+  const double reference_n = trial.limits.reference_n;
+  return {.changes_1_s = changes / watched_s,
+          .mean_error_ratio = std::abs(mean_n / reference_n - 1.0),
+          .spread_ratio = std::sqrt(std::max(0.0, square / count - mean_n * mean_n)) / reference_n,
+          .retreats_1_min = 60.0 * retreats / watched_s};
+}
+
+double impulse(const std::vector<PartMetrics>& metrics) {
+  double sum_ns = 0.0;
+  for (const PartMetrics& m : metrics) sum_ns += m.impulse_105_ns;
+  return sum_ns;
+}
+
+// The force seen as its mean over a turn, as an interrupted cut wants it.
+Part seen_by_the_turn() {
+  std::vector<Part> parts = comparison_parts();
+  Part keyway = *std::ranges::find(parts, "keyway", &Part::name);
+  keyway = in_surroundings(std::move(keyway), Surroundings::kNoise, 1);
+  keyway.machine.sensor.mean_s = 0.06;
+  return keyway;
+}
+
+}  // namespace
+
+std::vector<Goal> further_goals(const Contender& subject, unsigned threads,
+                                const WorkProgress& progress) {
+  const Contender& bound = *find_contender("oracle_detected");
+  std::vector<PartMetrics> own(kHeldBack);
+  std::vector<PartMetrics> best(kHeldBack);
+  LongFigures steady{};
+  PartMetrics turn{};
+  PartMetrics turn_best{};
+  const auto work = [&](std::size_t k) {
+    if (k < 2 * kHeldBack) {
+      const std::uint64_t seed = k / 2 + 1;
+      const Part part = in_surroundings(random_part(seed), Surroundings::kNoise, seed);
+      (k % 2 == 0 ? own : best)[k / 2] = cut_part(k % 2 == 0 ? subject : bound, part, {});
+    } else if (k == 2 * kHeldBack) {
+      steady = long_figures(subject);
+    } else {
+      turn = cut_part(subject, seen_by_the_turn(), {});
+      turn_best = cut_part(bound, seen_by_the_turn(), {});
+    }
+  };
+  on_threads(2 * kHeldBack + 2, threads, work, progress);
+  std::vector<Goal> goals{
+      {1, "I105 over the oracle, parts that nobody tuned to", impulse(own) / impulse(best), 1.25},
+      {7, "changes a second in a steady cut, 2 % noise", steady.changes_1_s, 3.0},
+      {7, "false retreats a minute, 2 % noise", steady.retreats_1_min, 0.1},
+      {8, "steady mean error [%]", 100.0 * steady.mean_error_ratio, 0.5},
+      {8, "spread of the steady force [%]", 100.0 * steady.spread_ratio, 1.6},
+      {9, "interrupted cut seen by the turn: rms [%]", 100.0 * turn.rms_ratio, 7.0},
+      {9, "interrupted cut seen by the turn: time over the oracle's",
+       turn.time_s / turn_best.time_s, 1.03}};
+  return goals;
+}
+
+}  // namespace cutforce::firmware::host
