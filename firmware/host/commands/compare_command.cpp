@@ -142,15 +142,12 @@ std::expected<void, InputError> write_results(const Options& options, const Comp
     if (auto written = write_file(options.json_file, json); !written) return written;
   }
   if (options.folder.empty()) return {};
-  auto folder = OutputFolder::make(options.folder);
-  if (!folder) return std::unexpected{folder.error()};
   const std::filesystem::path path = options.folder;
   for (const auto& [name, text] :
        {std::pair{"comparison.json", json},
         std::pair{"comparison.html", comparison_page(comparison, goals)}}) {
     if (auto written = write_file(path / name, text); !written) return written;
   }
-  folder->keep();
   return {};
 }
 
@@ -158,6 +155,8 @@ Exit perform(const Options& options) {
   catch_stop_signals();
   const auto chosen = choose(options);
   if (!chosen) return refuse(chosen.error());
+  auto folder = OutputFolder::make(options.folder);
+  if (!folder) return refuse(folder.error());
   Comparison comparison;
   {
     Progress progress("compare", "pieces of work");
@@ -170,6 +169,7 @@ Exit perform(const Options& options) {
     show_error(written.error());
     return Exit::kFailed;
   }
+  folder->keep();
   if (options.json) {
     std::cout << comparison_json(comparison, goals).dump(1) << "\n";
     return Exit::kDone;

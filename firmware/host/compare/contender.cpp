@@ -129,7 +129,7 @@ Machine machine_of(const Contender& contender, const Part& part, const Trial& tr
       hal::host::kTwoPi * part.machine.programmed_speed_1_s * part.machine.gear_ratio);
   m.force_reference_n = static_cast<float>(trial.limits.reference_n);
   m.force_limit_n = 10.0F * m.force_reference_n;
-  m.cut_threshold_n = 0.0F;  // from the reference
+  m.cut_threshold_n = 0.13F * m.force_reference_n;
   m.override_floor_pct = trial.floor_pct;
   m.override_ceiling_pct = static_cast<float>(trial.limits.ceiling_pct);
   m.override_initial_pct = static_cast<float>(part.machine.feed.initial_override_pct);
