@@ -20,7 +20,16 @@ enum class EstimatorName : std::uint8_t {
   kFused,
   kDynamometer
 };
-enum class ControllerName : std::uint8_t { kNone, kPi };
+enum class ControllerName : std::uint8_t {
+  kNone,
+  kPi,
+  kPid,
+  kPoleAssignment,
+  kMrac,
+  kVariableGain,
+  kFuzzy,
+  kPredictive
+};
 enum class PowerMode : std::uint8_t { kDotProduct, kTwoWattmeter, kFixedPowerFactor };
 enum class SpeedSource : std::uint8_t { kRotor, kSynchronous, kSlip };
 enum class SwitchMode : std::uint8_t { kAbsolute, kPositiveOnly };
@@ -118,6 +127,39 @@ struct Machine {
   float slew_down_pct_s;
   float cut_threshold_n;  // above it the tool is in the cut
   OverrideCode override_code;
+
+  // [control] the process, as the laws are told
+  float process_gain_n_pct;
+  float process_gain_least_n_pct;
+  float process_gain_most_n_pct;
+  float override_latency_s;
+  float feed_lag_s;
+  float process_lag_s;
+  float force_lag_s;
+  float feed_exponent_ratio;
+
+  // [control] one law each
+  bool pi_supervise;
+  float pid_proportional_pct_n;
+  float pid_integral_time_s;
+  float pid_derivative_time_s;
+  float pid_derivative_filter_ratio;
+  float pole_assignment_pole_1_ratio;
+  float pole_assignment_pole_2_ratio;
+  float pole_assignment_learning_ratio;
+  float mrac_model_time_s;
+  float mrac_adaptation_hz;
+  float variable_gain_open_loop_1_s;
+  float variable_gain_smoothing_s;
+  float fuzzy_error_range_n;
+  float fuzzy_change_range_n;
+  float fuzzy_step_range_pct;
+  float predictive_noise_ratio;
+  float predictive_noise_n;
+  float predictive_jump_ratio;
+  float predictive_calm_horizon_s;
+  float predictive_recovery_1_s;
+  float predictive_caution_ratio;
 
   friend constexpr bool operator==(const Machine&, const Machine&) noexcept = default;
 };

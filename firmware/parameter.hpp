@@ -10,6 +10,7 @@
 #include <span>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include "firmware/machine.hpp"
 
@@ -49,7 +50,8 @@ inline constexpr std::array<std::string_view, 2> kWinding{"star", "delta"};
 inline constexpr std::array<std::string_view, 2> kVoltage{"line_to_neutral", "line_to_line"};
 inline constexpr std::array<std::string_view, 5> kEstimator{"measured", "computed", "synthesized",
                                                             "fused", "dynamometer"};
-inline constexpr std::array<std::string_view, 2> kController{"none", "pi"};
+inline constexpr std::array<std::string_view, 8> kController{
+    "none", "pi", "pid", "pole_assignment", "mrac", "variable_gain", "fuzzy", "predictive"};
 inline constexpr std::array<std::string_view, 3> kPower{"dot_product", "two_wattmeter", "fixed_pf"};
 inline constexpr std::array<std::string_view, 3> kSpeed{"rotor", "synchronous", "slip"};
 inline constexpr std::array<std::string_view, 2> kSwitch{"absolute", "positive_only"};
@@ -142,6 +144,17 @@ constexpr void set(Machine& machine, [[maybe_unused]] std::size_t element, float
   } else {
     machine.*kMember = value;
   }
+}
+
+// One table from two.
+template <class T, std::size_t kFirst, std::size_t kSecond>
+[[nodiscard]] consteval auto joined(const std::array<T, kFirst>& first,
+                                    const std::array<T, kSecond>& second) {
+  return [&]<std::size_t... I, std::size_t... J>(std::index_sequence<I...>,
+                                                 std::index_sequence<J...>) {
+    return std::array<T, kFirst + kSecond>{first[I]..., second[J]...};
+  }
+  (std::make_index_sequence<kFirst>{}, std::make_index_sequence<kSecond>{});
 }
 
 }  // namespace detail
