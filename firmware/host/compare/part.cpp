@@ -60,7 +60,7 @@ Part settling(Part part, double from_mm, double to_mm) {
 
 Part keyway() {
   Part part = part_of("keyway", "Interrupted cut: a keyway, 15 % of each turn",
-                      stairs({{8.0, 1.0}, {24.0, 1.0}}));
+                      stairs({{8.0, 1.0}, {24.0, 1.0}, {8.0, 1.0}}));
   part.machine.process.slots_per_turn = 1.0;
   part.machine.process.slot_ratio = 0.15;
   part.machine.process.slots_begin_m = 8.0 * kMm;
