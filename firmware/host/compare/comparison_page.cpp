@@ -84,27 +84,35 @@ std::string impulse_section(const Comparison& comparison) {
   return table_section("Force above 105 % of the reference, by part", "figures dense", head, body);
 }
 
-std::string goal_section(const std::vector<Goal>& goals) {
-  if (goals.empty()) return {};
-  const std::string head =
-      cell("th", "scope=\"col\"", "Goal") + cell("th", "scope=\"col\" class=\"number\"", "Is") +
-      cell("th", "scope=\"col\" class=\"number\"", "Wanted") + cell("th", "scope=\"col\"", "");
+std::string goal_rows(const std::vector<Goal>& goals, bool reached) {
   std::string body;
-  std::size_t reached = 0;
   for (const Goal& goal : goals) {
-    reached += goal.reached() ? 1U : 0U;
+    if (goal.reached() != reached) continue;
     body +=
         "<tr>" +
         cell("th", "scope=\"row\"", std::to_string(goal.number) + ". " + escaped(goal.text)) +
         cell("td", "class=\"number\"", fixed(goal.value, 3)) +
         cell("td", "class=\"number\"", (goal.at_most ? "&le; " : "&ge; ") + fixed(goal.limit, 3)) +
-        cell("td", goal.reached() ? "" : "class=\"missed\"",
-             goal.reached() ? "reached" : "not reached") +
+        cell("td", reached ? "" : "class=\"missed\"", reached ? "reached" : "not reached") +
         "</tr>\n";
   }
-  return table_section("Goals of the predictive law: " + std::to_string(reached) + " of " +
-                           std::to_string(goals.size()) + " reached",
-                       "figures dense", head, body);
+  return body;
+}
+
+// What is missed stands open, the rest behind a click.
+std::string goal_section(const std::vector<Goal>& goals) {
+  if (goals.empty()) return {};
+  const std::string head =
+      "<table class=\"figures dense\">\n<thead><tr>" + cell("th", "scope=\"col\"", "Goal") +
+      cell("th", "scope=\"col\" class=\"number\"", "Is") +
+      cell("th", "scope=\"col\" class=\"number\"", "Wanted") + "<th></th></tr></thead>\n<tbody>\n";
+  const auto reached = std::ranges::count_if(goals, &Goal::reached);
+  const bool all = static_cast<std::size_t>(reached) == goals.size();
+  return "<section><h2>Goals of the predictive law: " + std::to_string(reached) + " of " +
+         std::to_string(goals.size()) + " reached</h2>\n<div class=\"scroll\">" +
+         (all ? "" : head + goal_rows(goals, false) + "</tbody></table>") +
+         "<details><summary>The goals that are reached</summary>" + head + goal_rows(goals, true) +
+         "</tbody></table></details></div></section>";
 }
 
 Json whole_numbers(const std::vector<float>& values) {
@@ -120,11 +128,13 @@ std::string embedded(const Comparison& comparison) {
             {"parts", Json::array()}};
   for (const ComparisonRow& row : comparison.rows) {
     const bool few = comparison.rows.size() <= kShown.size();
-    const bool shown = few || std::ranges::find(kShown, row.contender->name) != kShown.end();
+    const auto place = std::ranges::find(kShown, row.contender->name) - kShown.begin();
+    const bool shown = few || static_cast<std::size_t>(place) < kShown.size();
     json["contenders"].push_back({{"name", row.contender->name},
                                   {"title", row.contender->title},
                                   {"oracle", row.contender->oracle.has_value()},
-                                  {"shown", shown}});
+                                  {"shown", shown},
+                                  {"place", place}});
   }
   for (std::size_t k = 0; k < comparison.parts.size(); ++k) {
     const Part& part = comparison.parts[k];

@@ -60,7 +60,7 @@ std::string impulse_table(const Comparison& comparison) {
 std::string goal_table(const std::vector<Goal>& goals) {
   std::vector<std::vector<std::string>> rows{{"Goal", "is", "wanted", ""}};
   for (const Goal& goal : goals) {
-    rows.push_back({goal.text, fixed(goal.value, 3),
+    rows.push_back({std::to_string(goal.number) + ". " + goal.text, fixed(goal.value, 3),
                     (goal.at_most ? "<= " : ">= ") + fixed(goal.limit, 3),
                     goal.reached() ? "reached" : "NOT REACHED"});
   }

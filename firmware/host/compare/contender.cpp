@@ -237,9 +237,12 @@ PartMetrics cut_part(const Contender& contender, const Part& part, const Trial& 
   };
   for (std::uint32_t pass = 1;; ++pass) {
     run.start_part();
-    const Part next = next_part(own, trial, pass);
-    if (pass == contender.pass) return run_part(next, trial.limits, decide, seen);
-    [[maybe_unused]] const auto before = run_part(next, trial.limits, decide);
+    if (pass == contender.pass) {
+      return run_part(next_part(own, trial, pass), trial.limits, decide, seen);
+    }
+    const Part& before = trial.taught_by != nullptr ? *trial.taught_by : own;
+    [[maybe_unused]] const auto taught =
+        run_part(next_part(before, trial, pass), trial.limits, decide);
   }
 }
 

@@ -35,8 +35,9 @@ struct Contender {
 struct Trial {
   PartLimits limits{};
   float floor_pct = 20.0F;
-  double wear_per_pass = 0.02;     // from one part to the next
-  double misalignment_m = 0.1e-3;  // of every part but the first, at the most
+  double wear_per_pass = 0.02;      // from one part to the next
+  double misalignment_m = 0.1e-3;   // of every part but the first, at the most
+  const Part* taught_by = nullptr;  // what the passes before cut, where not the part itself
 };
 
 using Watch = std::function<void(const hal::host::ForceMachine&)>;

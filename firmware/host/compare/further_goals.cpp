@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "firmware/host/compare/goals.hpp"
@@ -65,6 +66,47 @@ Part seen_by_the_turn() {
   return keyway;
 }
 
+// Of a second pass: impulse over that of the first where the parts are clamped this much off.
+double misaligned_ratio(const Contender& first, const Contender& second, double misalignment_m) {
+  std::vector<PartMetrics> before;
+  std::vector<PartMetrics> after;
+  for (const Part& drawn : comparison_parts()) {
+    const Part part = in_surroundings(drawn, Surroundings::kNoise, 1);
+    Trial trial{};
+    trial.misalignment_m = misalignment_m;
+    before.push_back(cut_part(first, part, trial));
+    after.push_back(cut_part(second, part, trial));
+  }
+  return impulse(after) / impulse(before);
+}
+
+// What a map of another part does: each part after the one that stands before it in the list.
+struct WrongMap {
+  double peak_ratio;  // over the peak without a map, the worst part
+  double time_ratio;
+};
+WrongMap wrong_map(const Contender& first, const Contender& second) {
+  const std::vector<Part> drawn = comparison_parts();
+  std::vector<Part> parts;
+  for (const Part& part : drawn) {
+    parts.push_back(in_surroundings(part, Surroundings::kNoise, 1));
+  }
+  WrongMap worst{0.0, 0.0};
+  double time_s = 0.0;
+  double usual_s = 0.0;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    Trial trial{};
+    trial.taught_by = &parts[(k + parts.size() - 1) % parts.size()];
+    const PartMetrics usual = cut_part(first, parts[k], {});
+    const PartMetrics misled = cut_part(second, parts[k], trial);
+    worst.peak_ratio = std::max(worst.peak_ratio, misled.peak_ratio / usual.peak_ratio);
+    time_s += misled.time_s;
+    usual_s += usual.time_s;
+  }
+  worst.time_ratio = time_s / usual_s;
+  return worst;
+}
+
 }  // namespace
 
 std::vector<Goal> further_goals(const Contender& subject, unsigned threads,
@@ -75,6 +117,10 @@ std::vector<Goal> further_goals(const Contender& subject, unsigned threads,
   LongFigures steady{};
   PartMetrics turn{};
   PartMetrics turn_best{};
+  Contender second = subject;
+  second.pass = 2;
+  std::array<double, 2> misaligned{};
+  WrongMap misled{};
   const auto work = [&](std::size_t k) {
     if (k < 2 * kHeldBack) {
       const std::uint64_t seed = k / 2 + 1;
@@ -82,14 +128,24 @@ std::vector<Goal> further_goals(const Contender& subject, unsigned threads,
       (k % 2 == 0 ? own : best)[k / 2] = cut_part(k % 2 == 0 ? subject : bound, part, {});
     } else if (k == 2 * kHeldBack) {
       steady = long_figures(subject);
+    } else if (k == 2 * kHeldBack + 1) {
+      misaligned[0] = misaligned_ratio(subject, second, 0.2e-3);
+    } else if (k == 2 * kHeldBack + 2) {
+      misaligned[1] = misaligned_ratio(subject, second, 0.4e-3);
+    } else if (k == 2 * kHeldBack + 3) {
+      misled = wrong_map(subject, second);
     } else {
       turn = cut_part(subject, seen_by_the_turn(), {});
       turn_best = cut_part(bound, seen_by_the_turn(), {});
     }
   };
-  on_threads(2 * kHeldBack + 2, threads, work, progress);
+  on_threads(2 * kHeldBack + 5, threads, work, progress);
   std::vector<Goal> goals{
       {1, "I105 over the oracle, parts that nobody tuned to", impulse(own) / impulse(best), 1.25},
+      {5, "pass 2, clamped 0.2 mm off: I105 over that of the first", misaligned[0], 0.05},
+      {5, "pass 2, clamped 0.4 mm off: I105 over that of the first", misaligned[1], 0.20},
+      {5, "map of another part: peak over that without", misled.peak_ratio, 1.15},
+      {5, "map of another part: time over that without", misled.time_ratio, 1.10},
       {7, "changes a second in a steady cut, 2 % noise", steady.changes_1_s, 3.0},
       {7, "false retreats a minute, 2 % noise", steady.retreats_1_min, 0.1},
       {8, "steady mean error [%]", 100.0 * steady.mean_error_ratio, 0.5},

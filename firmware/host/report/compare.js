@@ -8,12 +8,14 @@
   const inks = ["blue", "orange", "green", "purple", "amber", "sky"];
   const color = name => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
   const font = "12px system-ui, -apple-system, 'Segoe UI', Roboto, 'Liberation Sans', sans-serif";
-  // The ones shown first get inks of their own; the rest take turns, dashed.
-  let solid = 0, dashed = 0;
+  // The ones shown first have inks of their own, the same in every comparison; the rest take turns,
+  // dashed.
+  let turn = 0;
   const looks = cuts.contenders.map(c =>
     c.oracle ? { ink: "grey", dash: [5, 4] }
-      : c.shown && solid < inks.length ? { ink: inks[solid++], dash: [] }
-      : { ink: inks[dashed++ % inks.length], dash: [2, 3] });
+      : c.place < 3 ? { ink: inks[c.place], dash: [] }
+      : cuts.contenders.length <= inks.length ? { ink: inks[3 + turn++ % 3], dash: [] }
+      : { ink: inks[turn++ % inks.length], dash: [2, 3] });
   const shown = cuts.contenders.map(c => c.shown);
   const plots = [];
 
