@@ -9,19 +9,20 @@ namespace {
 
 using estimator::power_positive;
 
-constexpr float kScale = 1024.0F;        // of e
-constexpr std::uint16_t kFree = 65535;   // air, or so light a cut that nothing limits
-constexpr float kMargin_s = 0.04F;       // path: a part lies this much off, perhaps
-constexpr float kBehind_s = 0.02F;       // path: a cell holds this long after it was passed
-constexpr float kServo_ratio = 1.5F;     // braking takes this many lags of the servo
-constexpr float kFlat_ratio = 1.15F;     // cells this close to each other are averaged
-constexpr float kShare = 0.5F;           // of the new part in a cell that changes
+constexpr float kScale = 1024.0F;       // of e
+constexpr std::uint16_t kFree = 65535;  // air, or so light a cut that nothing limits
+constexpr float kMargin_s = 0.04F;      // path: a part lies this much off, perhaps
+constexpr float kBehind_s = 0.02F;      // path: a cell holds this long after it was passed
+constexpr float kServo_ratio = 1.5F;    // braking takes this many lags of the servo
+constexpr float kFlat_ratio = 1.15F;    // cells this close to each other are averaged
+constexpr float kShare = 0.5F;          // of the new part in a cell that changes
 constexpr float kWearLeast = 0.7F;
 constexpr float kWearMost = 1.5F;
 constexpr float kWearMemory_s = 1.0F;
-constexpr float kFar_ratio = 1.3F;       // a gain this far off the map's tells nothing of wear
-constexpr float kDoubt_ratio = 0.75F;    // of the reference
+constexpr float kFar_ratio = 1.3F;     // a gain this far off the map's tells nothing of wear
+constexpr float kDoubt_ratio = 0.75F;  // of the reference
 constexpr float kDoubt_s = 0.7F;
+constexpr float kDoubtWay_s = 0.3F;  // path: the cell may begin this much early
 constexpr float kDoubtInAir_s = 1.75F;
 
 constexpr std::size_t index_of(float position_s) noexcept {
@@ -50,7 +51,7 @@ void PathMap::write_to(float position_s, float gain_n) noexcept {
 void PathMap::learn(const Lesson& lesson) noexcept {
   State& s = state_;
   const float went_s = lesson.feed_ratio * config_.period_s;
-  s.earlier_s = {s.position_s, s.earlier_s[0], s.earlier_s[1]};
+  s.earlier_s = {s.position_s, s.earlier_s[0]};
   s.position_s += went_s;  // (C92)
   if (s.started == 0) return;
   // Where the tool was when the force arose that has just been read.
@@ -58,7 +59,7 @@ void PathMap::learn(const Lesson& lesson) noexcept {
   const float seen_s = s.position_s - lesson.feed_ratio * late_s;
   if (lesson.jumped) {
     // Up to where the jump may have been, the old gain holds. After a jump down it holds until now.
-    write_to(lesson.rising ? s.earlier_s[2] - lesson.feed_ratio * late_s : seen_s, s.last_gain_n);
+    write_to(lesson.rising ? s.earlier_s[1] : seen_s, s.last_gain_n);
   }
   if (lesson.resolving) {
     if (!lesson.rising) write_to(seen_s, s.last_gain_n);
@@ -68,8 +69,8 @@ void PathMap::learn(const Lesson& lesson) noexcept {
   s.last_gain_n = lesson.gain_n;
   const std::uint16_t known = s.learned[index_of(seen_s)];
   if (!lesson.steady || known == 0 || known == kFree || !(lesson.gain_n > 0.0F)) return;
-  const float then_n = config_.gain_n * power_positive(static_cast<float>(known) / kScale,
-                                                       -config_.feed_exponent);
+  const float then_n =
+      config_.gain_n * power_positive(static_cast<float>(known) / kScale, -config_.feed_exponent);
   const float ratio = lesson.gain_n / then_n;
   if (!(ratio * kFar_ratio > s.wear_ratio && ratio < kFar_ratio * s.wear_ratio)) return;
   const float share = config_.period_s / (kWearMemory_s + config_.period_s);
@@ -100,15 +101,20 @@ float PathMap::slowest(const Question& question, float scale_pct) const noexcept
 float PathMap::limit(const Question& question) noexcept {
   State& s = state_;
   if (s.started == 0 || s.trusted == 0) return question.override_pct;
-  const float scale_pct =
-      100.0F / kScale *
-      power_positive(question.reference_n / (config_.gain_n * s.wear_ratio),
-                     1.0F / config_.feed_exponent);  // (C94)
+  const float scale_pct = 100.0F / kScale * question.spindle_ratio *
+                          power_positive(question.reference_n / (config_.gain_n * s.wear_ratio),
+                                         1.0F / config_.feed_exponent);  // (C94)
   const float allowed_pct = slowest(question, scale_pct);
   const bool held_down =
       allowed_pct < question.override_pct && question.force_n < kDoubt_ratio * question.reference_n;
-  s.doubt_s = held_down ? s.doubt_s + config_.period_s : 0.0F;
-  if (s.doubt_s > (question.air ? kDoubtInAir_s : kDoubt_s)) s.trusted = 0;  // (C97)
+  if (!held_down) {
+    s.doubt_s = 0.0F;
+    s.doubt_from_s = s.position_s;
+  } else {
+    s.doubt_s += config_.period_s;
+  }
+  const bool long_enough = s.doubt_s > (question.air ? kDoubtInAir_s : kDoubt_s);
+  if (long_enough && s.position_s - s.doubt_from_s > kDoubtWay_s) s.trusted = 0;  // (C97)
   return allowed_pct;
 }
 

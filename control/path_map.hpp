@@ -56,9 +56,10 @@ class PathMap {
 
   struct Question {
     float reference_n;
-    float ahead_s;       // path to the end of the dead time
-    float force_n;       // there
-    float override_pct;  // wanted without the map
+    float ahead_s;        // path to the end of the dead time
+    float force_n;        // there
+    float override_pct;   // wanted without the map
+    float spindle_ratio;  // spindle speed over the programmed one
     bool air;
   };
 
@@ -66,10 +67,11 @@ class PathMap {
     std::array<std::uint16_t, kCells> learned{};   // of earlier parts; 0: nothing known
     std::array<std::uint16_t, kCells> recorded{};  // of this part
     float position_s = 0.0F;                       // of the tool, at 100 %
-    std::array<float, 3> earlier_s{};              // one, two, three ticks ago
+    std::array<float, 2> earlier_s{};              // one and two ticks ago
     float wear_ratio = 1.0F;
-    float last_gain_n = 0.0F;  // settled, before a jump
-    float doubt_s = 0.0F;      // the map has held the force down for
+    float last_gain_n = 0.0F;   // settled, before a jump
+    float doubt_s = 0.0F;       // the map has held the force down for
+    float doubt_from_s = 0.0F;  // and since this place
     std::uint32_t written = 0;  // cells of this part
     std::uint32_t started = 0;  // 1: a part has begun
     std::uint32_t trusted = 1;

@@ -25,8 +25,17 @@ constexpr float kKeep_ratio = 0.03F;  // of the override: not worth a change at 
 constexpr float kKeepFade_s = 1.5F;
 constexpr float kCoarse_ratio = 0.04F;  // of the override: coarser steps are rounded down
 constexpr float kEntry_ratio = 0.05F;   // of the reference: a reading above it ends the air
-constexpr float kLost_ratio = 0.2F;     // of the gain before: less is a lost cut
-constexpr float kLost_s = 0.5F;         // after which a cut that is left is a light one
+constexpr float kTelling_ratio = 0.2F;  // of the reference: force that tells of the dead time
+constexpr float kLongestLatency_s = 0.4F;
+constexpr float kMostTicks = static_cast<float>(Predictive::kHistory - 2);
+constexpr float kMarginLeast = 1.6F;  // the loop must bear this much more than the highest gain
+constexpr float kConfidence = 2.0F;   // standard deviations up to it
+constexpr float kLost_ratio = 0.2F;   // of the gain before: less is a lost cut
+constexpr float kLost_s = 0.5F;       // after which a cut that is left is a light one
+
+LagStep lag_step(const Predictive::Config& config, float length_s) noexcept {
+  return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
+}
 
 }  // namespace
 
@@ -70,28 +79,30 @@ auto Predictive::make(const Config& config) noexcept -> std::expected<Predictive
                                   .feed_exponent = config.feed_exponent,
                                   .gain_n = config.process_gain_n});
   if (!map) return std::unexpected{ConfigError::kGain};
-  return Predictive{config, *tracker, *map};
+  const auto bank = LatencyBank::make(
+      {.period_s = config.period_s,
+       .latency_s = config.latency_s,
+       .most_latency_s = std::min(kLongestLatency_s, kMostTicks * config.period_s),
+       .feed_lag_s = config.feed_lag_s,
+       .cut_lag_s = config.process_lag_s,
+       .sensor_lag_s = config.sensor_lag_s});
+  if (!bank) return std::unexpected{ConfigError::kLatency};
+  return Predictive{config, *tracker, *map, *bank};
 }
 
-Predictive::Predictive(const Config& config, const GainTracker& tracker,
-                       const PathMap& map) noexcept
+Predictive::Predictive(const Config& config, const GainTracker& tracker, const PathMap& map,
+                       const LatencyBank& bank) noexcept
     : config_(config),
       tracker_(tracker),
       map_(map),
-      whole_ticks_(static_cast<std::uint32_t>(config.latency_s / config.period_s + 1e-4F)) {
-  const auto step = [&config](float length_s) {
-    return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
-  };
-  const float early_s =
-      std::max(config.latency_s - static_cast<float>(whole_ticks_) * config.period_s, 0.0F);
-  tick_ = step(config.period_s);
-  early_ = step(early_s);
-  late_ = step(config.period_s - early_s);
+      bank_(bank),
+      tick_(lag_step(config, config.period_s)) {
+  assume_latency(config.latency_s);
   const std::array<float, kReaches> lengths{config.period_s, 2.0F * config.period_s,
                                             std::max(kMiddle_s, 2.0F * config.period_s),
                                             config.calm_horizon_s};
   for (std::size_t k = 0; k < kReaches; ++k) {
-    const LagStep h = step(lengths[k]);
+    const LagStep h = lag_step(config, lengths[k]);
     const float apart_s = config.feed_lag_s - config.process_lag_s;
     horizons_[k] = {.length_s = lengths[k],
                     .force = h.cut,
@@ -99,6 +110,24 @@ Predictive::Predictive(const Config& config, const GainTracker& tracker,
   }
   state_.sent.fill(1.0F);
   state_.feed.v = 1.0F;
+}
+
+void Predictive::assume_latency(float latency_s) noexcept {  // (C71)
+  whole_ticks_ = static_cast<std::uint32_t>(latency_s / config_.period_s + 1e-4F);
+  const float early_s =
+      std::max(latency_s - static_cast<float>(whole_ticks_) * config_.period_s, 0.0F);
+  dead_decay_ = exp_bounded(-latency_s / config_.process_lag_s);
+  early_ = lag_step(config_, early_s);
+  late_ = lag_step(config_, config_.period_s - early_s);
+}
+
+void Predictive::find_latency(const Input& input, bool jumped) noexcept {
+  const bool usable = input.phase == CutPhase::kCut && !jumped &&
+                      input.force_n > kTelling_ratio * input.force_reference_n;
+  const float before_s = bank_.state().latency_s;
+  const auto found =
+      bank_.step({.sent = state_.sent, .reading_n = input.force_n, .usable = usable});
+  if (found.latency_s != before_s) assume_latency(found.latency_s);
 }
 
 // What the override did to the feed since the last tick: mean of v. (C70)-(C73)
@@ -163,6 +192,23 @@ auto Predictive::reach(const Forecast& ahead, float reference_n) noexcept -> Rea
     return recent || ahead.force_n > kFarAbove_ratio * reference_n ? kOneTick : kMiddle;
   }
   return recent ? kTwoTicks : kCalm;
+}
+
+// How many times the gain that the law works with the true one may be. (C104)
+float Predictive::stable_gain_ratio(const Horizon& horizon) const noexcept {
+  const float decay = tick_.cut;
+  const float loop = horizon.force / (1.0F - horizon.force) * (1.0F - decay);
+  return 1.0F + (1.0F - estimator::magnitude(decay - loop)) / (loop * dead_decay_);
+}
+
+// A longer horizon while the gain may be too uncertain for a short one. (C105)
+auto Predictive::with_margin(Reach reach, const GainTracker::Output& seen) const noexcept -> Reach {
+  const float highest_n = seen.gain_n + kConfidence * seen.gain_sigma_n;
+  while (reach != kCalm &&
+         stable_gain_ratio(horizons_[reach]) * state_.feared_n < kMarginLeast * highest_n) {
+    reach = static_cast<Reach>(reach + 1);
+  }
+  return reach;
 }
 
 // The override that brings the force to the reference at the end of the horizon. (C88), (C89)
@@ -266,15 +312,17 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   const Forecast ahead = forecast(seen.force_n, gain_n * speed);
   Forecast feared = ahead;
   feared.drive_n = s.feared_n * speed;
+  if (config_.finds_latency) find_latency(input, seen.jumped);
   if (config_.learns) learn(seen, feed.mean, input.phase);
-  float wanted =
-      wanted_pct(feared, horizons_[reach(ahead, input.force_reference_n)], input.force_reference_n);
+  const Horizon& horizon = horizons_[with_margin(reach(ahead, input.force_reference_n), seen)];
+  float wanted = wanted_pct(feared, horizon, input.force_reference_n);
   if (!rise) wanted = std::min(wanted, input.override_applied_pct);
   if (config_.learns) {
     wanted = std::max(map_.limit({.reference_n = input.force_reference_n,
                                   .ahead_s = ahead.path_s,
                                   .force_n = ahead.force_n,
                                   .override_pct = wanted,
+                                  .spindle_ratio = input.spindle_ratio,
                                   .air = input.phase == CutPhase::kAir}),
                       config_.floor_pct);
   }
@@ -282,6 +330,9 @@ auto Predictive::step(const Input& input) noexcept -> Output {
       law_answer(input.mode == LawMode::kActive ? as_code(wanted, input.override_applied_pct)
                                                 : input.override_applied_pct);
   out.process_gain_n_pct = 0.01F * seen.gain_n;
+  if (seen.gain_n > 0.0F) {
+    out.stability_margin_ratio = stable_gain_ratio(horizon) * s.feared_n / seen.gain_n;
+  }
   out.process_gain_sigma_ratio = seen.gain_n > 0.0F ? seen.gain_sigma_n / seen.gain_n : 0.0F;
   return out;
 }
@@ -290,6 +341,7 @@ auto Predictive::state() const noexcept -> State {
   State s = state_;
   s.tracker = tracker_.state();
   s.map = map_.state();
+  s.bank = bank_.state();
   return s;
 }
 
@@ -297,6 +349,8 @@ void Predictive::restore(const State& state) noexcept {
   state_ = state;
   tracker_.restore(state.tracker);
   map_.restore(state.map);
+  bank_.restore(state.bank);
+  assume_latency(state.bank.latency_s);
 }
 
 }  // namespace cutforce::control

@@ -18,6 +18,7 @@
 
 #include "control/force_model.hpp"
 #include "control/gain_tracker.hpp"
+#include "control/latency_bank.hpp"
 #include "control/law.hpp"
 #include "control/path_map.hpp"
 
@@ -61,6 +62,7 @@ class Predictive {
     float ceiling_pct;
     std::uint32_t step_pct;  // 1 or 10
     bool learns;             // from one part to the next; needs the start of each
+    bool finds_latency;      // while cutting: a commissioning step
 
     [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
   };
@@ -71,6 +73,7 @@ class Predictive {
   struct State {
     GainTracker::State tracker{};
     PathMap::State map{};
+    LatencyBank::State bank{};
     FeedState feed{};
     std::array<float, kHistory> sent{};  // (u/u0)^p, newest first
     float sent_pct = 100.0F;             // u of sent[0]
@@ -92,7 +95,8 @@ class Predictive {
   void restore(const State& state) noexcept;
 
  private:
-  Predictive(const Config& config, const GainTracker& tracker, const PathMap& map) noexcept;
+  Predictive(const Config& config, const GainTracker& tracker, const PathMap& map,
+             const LatencyBank& bank) noexcept;
 
   struct Forecast {
     float force_n;  // at the end of the dead time
@@ -115,8 +119,12 @@ class Predictive {
   [[nodiscard]] Forecast forecast(float force_n, float drive_n) const noexcept;
   [[nodiscard]] float pessimistic_gain_n(const GainTracker::Output& seen) noexcept;
   [[nodiscard]] Reach reach(const Forecast& ahead, float reference_n) noexcept;
+  [[nodiscard]] float stable_gain_ratio(const Horizon& horizon) const noexcept;
+  [[nodiscard]] Reach with_margin(Reach reach, const GainTracker::Output& seen) const noexcept;
   [[nodiscard]] float wanted_pct(const Forecast& ahead, const Horizon& horizon,
                                  float reference_n) const noexcept;
+  void assume_latency(float latency_s) noexcept;
+  void find_latency(const Input& input, bool jumped) noexcept;
   [[nodiscard]] float feed_ratio(float w) const noexcept;
   void learn(const GainTracker::Output& seen, float feed, CutPhase phase) noexcept;
   [[nodiscard]] float as_code(float wanted_pct, float sent_pct) noexcept;
@@ -125,7 +133,9 @@ class Predictive {
   Config config_;
   GainTracker tracker_;
   PathMap map_;
+  LatencyBank bank_;
   std::uint32_t whole_ticks_;    // of the dead time
+  float dead_decay_;             // of the cut over the dead time
   LagStep tick_, early_, late_;  // early_: the part of a tick before a byte arrives
   std::array<Horizon, kReaches> horizons_;
   State state_{};

@@ -10,7 +10,6 @@ using control::LawName;
 
 constexpr float kSettle_s = 2.0F;   // in the cut, until the process gain counts as settled
 constexpr float kSoft_pct = 10.0F;  // overrides below teach less
-constexpr float kScan_s = 0.02F;  // of the PLC that reads the override
 constexpr float kDistinct_ratio = 0.02F;
 
 LawName in_charge(ControllerName name) noexcept {
@@ -96,7 +95,7 @@ control::Predictive::Config predictive(const Machine& m, float period_s) noexcep
   constexpr auto kLongest = static_cast<float>(control::Predictive::kHistory - 2);
   return {.period_s = period_s,
           .latency_s = std::min(m.override_latency_s, 0.999F * kLongest * period_s),
-          .latency_sigma_s = kScan_s / 3.4641016F,
+          .latency_sigma_s = m.override_latency_sigma_s,
           .feed_lag_s = apart_from(m.feed_lag_s, m.process_lag_s),
           .process_lag_s = m.process_lag_s,
           .sensor_lag_s = apart_from(m.force_lag_s, m.process_lag_s),
@@ -111,7 +110,8 @@ control::Predictive::Config predictive(const Machine& m, float period_s) noexcep
           .floor_pct = m.override_floor_pct,
           .ceiling_pct = m.override_ceiling_pct,
           .step_pct = m.override_step_pct > 5.0F ? 10U : 1U,
-          .learns = true};
+          .learns = m.predictive_learns,
+          .finds_latency = m.predictive_finds_latency};
 }
 
 }  // namespace

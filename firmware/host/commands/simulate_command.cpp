@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "firmware/host/commands/command.hpp"
+#include "firmware/host/commands/machine_options.hpp"
 #include "firmware/host/commands/progress.hpp"
 #include "firmware/host/run/simulate.hpp"
 
@@ -20,6 +21,7 @@ struct Options {
   std::string scenario;
   std::string out;
   std::string recording;
+  BlockOptions blocks;
   bool compare = false;
   bool make_template = false;
   bool scenario_text = false;
@@ -61,7 +63,7 @@ Exit perform_simulate(Options options) {
     return refuse(
         InputError{"SCENARIO", "no scenario is named", "name a file, or ask for --template"});
   }
-  const auto scenario = read_scenario(options.scenario);
+  const auto scenario = read_scenario(options.scenario, options.blocks.options());
   if (!scenario) return refuse(scenario.error());
   if (options.out.empty()) {
     options.out = "out/" + std::filesystem::path(options.scenario).stem().string();
@@ -74,7 +76,7 @@ Exit perform_demo(Options options) {
     std::cout << demo_scenario_text();
     return Exit::kDone;
   }
-  const auto scenario = parse_scenario(demo_scenario_text(), "demo");
+  const auto scenario = parse_scenario(demo_scenario_text(), "demo", options.blocks.options());
   if (!scenario) return refuse(scenario.error());
   options.compare = true;
   return run_scenario(*scenario, options);
@@ -90,6 +92,7 @@ void add_demo(CLI::App& program, Action& action) {
   command->add_option("--out", options->out, "Folder for the files of the run")
       ->type_name("DIR")
       ->capture_default_str();
+  options->blocks.add_to(*command, "the scenario");
   command->add_flag("--json", options->json, "Print the summary as JSON");
   command->add_flag("--scenario", options->scenario_text, "Print the demo's scenario instead");
   command->footer(
@@ -113,6 +116,7 @@ void add_simulate(CLI::App& program, Action& action) {
       ->add_option("--recording", options->recording,
                    "Write only the recording, to this file (.csv, .csv.gz, .cfr)")
       ->type_name("FILE");
+  options->blocks.add_to(*command, "the scenario");
   command->add_flag("--compare", options->compare, "Also P3's estimators, on the same samples");
   command->add_flag("--template", options->make_template,
                     "Print a commented scenario with every key instead");
@@ -120,6 +124,7 @@ void add_simulate(CLI::App& program, Action& action) {
   command->footer(R"(Examples:
   cutforce simulate --template > mine.toml
   cutforce simulate mine.toml --out out/mine --compare
+  cutforce simulate mine.toml --controller fuzzy --out out/fuzzy
   cutforce simulate host_tests/scenarios/vhz.toml --recording vhz.csv.gz
 
 The same scenario gives the same files, bit for bit.)");

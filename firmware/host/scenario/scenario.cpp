@@ -150,7 +150,8 @@ void read_simulation(TomlDocument& document, Scenario& scenario) {
   }
 }
 
-std::expected<Scenario, std::vector<InputError>> read(TomlDocument& document, std::string name) {
+std::expected<Scenario, std::vector<InputError>> read(TomlDocument& document, std::string name,
+                                                      std::span<const MachineOption> options) {
   Scenario scenario{};
   TomlSection root = document.root();
   scenario.title = root.text("title").value_or("Simulated run");
@@ -170,6 +171,9 @@ std::expected<Scenario, std::vector<InputError>> read(TomlDocument& document, st
   }
   fill_sections(believed, root, controls);
   fill_sections(believed, root.section("believed"), others);
+  for (const MachineOption& option : options) {
+    set_value(believed, option.key, option.value, option.option);
+  }
 
   std::vector<InputError> errors = document.finish();
   if (errors.empty()) {
@@ -187,17 +191,18 @@ std::expected<Scenario, std::vector<InputError>> read(TomlDocument& document, st
 
 }  // namespace
 
-std::expected<Scenario, std::vector<InputError>> read_scenario(const std::filesystem::path& path) {
+std::expected<Scenario, std::vector<InputError>> read_scenario(
+    const std::filesystem::path& path, std::span<const MachineOption> options) {
   auto document = TomlDocument::read(path);
   if (!document) return std::unexpected{std::vector{document.error()}};
-  return read(**document, path.string());
+  return read(**document, path.string(), options);
 }
 
-std::expected<Scenario, std::vector<InputError>> parse_scenario(std::string_view text,
-                                                                std::string name) {
+std::expected<Scenario, std::vector<InputError>> parse_scenario(
+    std::string_view text, std::string name, std::span<const MachineOption> options) {
   auto document = TomlDocument::parse(text, name);
   if (!document) return std::unexpected{std::vector{document.error()}};
-  return read(**document, std::move(name));
+  return read(**document, std::move(name), options);
 }
 
 bool is_scenario(const std::filesystem::path& path) {
