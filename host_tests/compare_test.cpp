@@ -82,6 +82,23 @@ TEST(Compare, NoControllerBeatsTheOracleOfThePresent) {
   }
 }
 
+// The next part goes on with the override that stood last, and the loop with what it has learned.
+TEST(Compare, ALaterPassIsTheSameLoopOnTheNextPart) {
+  for (const char* name : {"step4", "stairs"}) {
+    SCOPED_TRACE(name);
+    const Part part = in_surroundings(parts_named({name})[0], Surroundings::kNoise, 2);
+    const double first_ns = cut_part(*find_contender("predictive"), part, {}).impulse_105_ns;
+    const double second_ns = cut_part(*find_contender("predictive_2"), part, {}).impulse_105_ns;
+    EXPECT_GT(first_ns, 20.0);
+    EXPECT_LT(second_ns, 0.3 * first_ns);
+  }
+  // A law that learns nothing of the part gains nothing.
+  Contender second = *find_contender("pi_tuned");
+  second.pass = 2;
+  const Part part = in_surroundings(parts_named({"step4"})[0], Surroundings::kNoise, 2);
+  EXPECT_GT(cut_part(second, part, {}).impulse_105_ns, 100.0);
+}
+
 TEST(OnThreads, DoesEachPieceOnceAndHandsOnAFailure) {
   std::vector<std::atomic<int>> done(100);
   std::size_t last = 0;

@@ -17,8 +17,9 @@ namespace {
 using hal::host::Profile;
 using hal::host::ProfilePoint;
 
-// The next workpiece of a series: a little harder to cut, clamped a little elsewhere.
-Part next_part(Part part, const Trial& trial, std::uint32_t pass) {
+// The next workpiece of a series: a little harder to cut, clamped a little elsewhere, and begun at
+// the override that acted last: the CNC goes on with what it reads.
+Part next_part(Part part, const Trial& trial, std::uint32_t pass, double override_pct) {
   hal::host::ForceMachineConfig& m = part.machine;
   hal::host::RandomStream random(m.seed, 40 + pass);
   const double shift_m = trial.misalignment_m * (2.0 * random.uniform() - 1.0);
@@ -27,6 +28,7 @@ Part next_part(Part part, const Trial& trial, std::uint32_t pass) {
     m.process.specific_force_n_m2 *= 1.0 + trial.wear_per_pass;
   }
   if (pass == 1) return part;
+  m.feed.initial_override_pct = override_pct;
   std::vector<ProfilePoint> depth = m.process.depth_m.points();
   for (ProfilePoint& point : depth) point.at += shift_m;
   m.process.depth_m = Profile(std::move(depth));
@@ -48,6 +50,9 @@ class LoopRun {
   LoopRun(const Machine& machine, float ceiling_pct) : loop_(made(machine, ceiling_pct)) {}
 
   void start_part() { starts_ = true; }
+  [[nodiscard]] double override_pct() const {
+    return static_cast<double>(loop_.command().override_pct);
+  }
   double decide(hal::Sample sample) {
     sample.part_start = starts_ ? 1.0F : 0.0F;
     sample.present |= hal::bit(hal::Signal::kPartStart);
@@ -56,7 +61,7 @@ class LoopRun {
     time_ns_ += period_ns_;
     // A dynamometer's force is answered at once; a loop that is not asked keeps its override.
     [[maybe_unused]] const auto output = loop_.step(sample);
-    return static_cast<double>(loop_.command().override_pct);
+    return override_pct();
   }
 
  private:
@@ -137,12 +142,11 @@ PartMetrics cut_part(const Contender& contender, const Part& part, const Trial& 
   };
   for (std::uint32_t pass = 1;; ++pass) {
     run.start_part();
-    if (pass == contender.pass) {
-      return run_part(next_part(own, trial, pass), trial.limits, decide, seen);
-    }
-    const Part& before = trial.taught_by != nullptr ? *trial.taught_by : own;
-    [[maybe_unused]] const auto taught =
-        run_part(next_part(before, trial, pass), trial.limits, decide);
+    const bool last = pass == contender.pass;
+    const Part& drawn = last || trial.taught_by == nullptr ? own : *trial.taught_by;
+    const Part next = next_part(drawn, trial, pass, run.override_pct());
+    const PartMetrics metrics = run_part(next, trial.limits, decide, last ? seen : watch_nothing);
+    if (last) return metrics;
   }
 }
 

@@ -50,6 +50,11 @@ void fuzzy(Machine& m) { m.controller = ControllerName::kFuzzy; }
 void mrac(Machine& m) { m.controller = ControllerName::kMrac; }
 void predictive(Machine& m) { m.controller = ControllerName::kPredictive; }
 
+void predictive_timing(Machine& m) {
+  predictive(m);
+  m.predictive_finds_latency = true;
+}
+
 constexpr float kSlow_s = 0.2F;  // pole assignment takes the cut for settled within a period
 
 constexpr auto kContenders = std::to_array<Contender>({
@@ -80,6 +85,9 @@ constexpr auto kContenders = std::to_array<Contender>({
     {.name = "fuzzy", .title = "Fuzzy, 7 x 7 rules", .choose = &fuzzy},
     {.name = "mrac", .title = "Model reference adaptive, normalised", .choose = &mrac},
     {.name = "predictive", .title = "Predictive, first pass", .choose = &predictive},
+    {.name = "predictive_timing",
+     .title = "Predictive that finds the dead time while it cuts",
+     .choose = &predictive_timing},
     {.name = "predictive_2",
      .title = "Predictive, second pass of the same part",
      .choose = &predictive,

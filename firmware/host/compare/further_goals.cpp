@@ -80,15 +80,22 @@ double misaligned_ratio(const Contender& first, const Contender& second, double 
   return impulse(after) / impulse(before);
 }
 
-// What a map of another part does: each part after the one that stands before it in the list.
+void without_map(Machine& m) {
+  m.controller = ControllerName::kPredictive;
+  m.predictive_learns = false;
+}
+
+// What a map of another part does: each part after the one that stands before it in the list,
+// beside the same without a map.
 struct WrongMap {
-  double peak_ratio;  // over the peak without a map, the worst part
+  double peak_ratio;  // of the worst part
   double time_ratio;
 };
-WrongMap wrong_map(const Contender& first, const Contender& second) {
-  const std::vector<Part> drawn = comparison_parts();
+WrongMap wrong_map(const Contender& second) {
+  Contender plain = second;
+  plain.choose = &without_map;
   std::vector<Part> parts;
-  for (const Part& part : drawn) {
+  for (const Part& part : comparison_parts()) {
     parts.push_back(in_surroundings(part, Surroundings::kNoise, 1));
   }
   WrongMap worst{0.0, 0.0};
@@ -97,7 +104,7 @@ WrongMap wrong_map(const Contender& first, const Contender& second) {
   for (std::size_t k = 0; k < parts.size(); ++k) {
     Trial trial{};
     trial.taught_by = &parts[(k + parts.size() - 1) % parts.size()];
-    const PartMetrics usual = cut_part(first, parts[k], {});
+    const PartMetrics usual = cut_part(plain, parts[k], trial);
     const PartMetrics misled = cut_part(second, parts[k], trial);
     worst.peak_ratio = std::max(worst.peak_ratio, misled.peak_ratio / usual.peak_ratio);
     time_s += misled.time_s;
@@ -133,7 +140,7 @@ std::vector<Goal> further_goals(const Contender& subject, unsigned threads,
     } else if (k == 2 * kHeldBack + 2) {
       misaligned[1] = misaligned_ratio(subject, second, 0.4e-3);
     } else if (k == 2 * kHeldBack + 3) {
-      misled = wrong_map(subject, second);
+      misled = wrong_map(second);
     } else {
       turn = cut_part(subject, seen_by_the_turn(), {});
       turn_best = cut_part(bound, seen_by_the_turn(), {});
