@@ -55,7 +55,7 @@ namespace cutforce::firmware::detail {
           0x0713, "override_latency_s", "s", {0, 1}, 0.05F, 0.05F, kConstruction,
           "Dead time from an override on the port to a feed that begins to change."),
       number<&M::override_latency_sigma_s>(
-          0x0718, "override_latency_sigma_s", "s", {0, 0.5F}, 0.003F, 0.003F, kConstruction,
+          0x0718, "override_latency_sigma_s", "s", {0, 0.5F}, 0.006F, 0.006F, kConstruction,
           "Standard deviation of override_latency_s: the period of a scan over 3.5."),
       number<&M::feed_lag_s>(0x0714, "feed_lag_s", "s", {0.001F, 2}, 0.04F, 0.04F, kConstruction,
                              "Lag of the feed drive."),
