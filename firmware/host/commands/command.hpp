@@ -33,6 +33,7 @@ void add_lockstep(CLI::App& program, Action& action);
 void add_evaluate(CLI::App& program, Action& action);
 void add_convert(CLI::App& program, Action& action);
 void add_tune(CLI::App& program, Action& action);
+void add_compare(CLI::App& program, Action& action);
 
 // The whole program. Exit status as Exit; 128 + n where signal n ended it.
 [[nodiscard]] int run_program(int argc, const char* const* argv);

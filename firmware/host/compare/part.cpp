@@ -60,7 +60,7 @@ Part settling(Part part, double from_mm, double to_mm) {
 
 Part keyway() {
   Part part = part_of("keyway", "Interrupted cut: a keyway, 15 % of each turn",
-                      stairs({{8.0, 1.0}, {24.0, 1.0}}));
+                      stairs({{8.0, 1.0}, {24.0, 1.0}, {8.0, 1.0}}));
   part.machine.process.slots_per_turn = 1.0;
   part.machine.process.slot_ratio = 0.15;
   part.machine.process.slots_begin_m = 8.0 * kMm;
@@ -179,6 +179,12 @@ Part random_part(std::uint64_t seed) {
   part.machine.process.hard_spots = {
       {begin_m, begin_m + (0.5 + 3.0 * random.uniform()) * kMm, 1.2 + 0.6 * random.uniform()}};
   part.machine.process.wear_ratio = Profile{{0.0, 1.0}, {20.0, 1.0 + 0.3 * random.uniform()}};
+  return part;
+}
+
+Part long_cut(double depth_m) {
+  Part part = part_of("long", "One depth", Profile(depth_m));
+  part.machine.feed.length_m = 1e3;
   return part;
 }
 

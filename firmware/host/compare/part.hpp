@@ -34,6 +34,9 @@ enum class Surroundings : std::uint8_t {
 // Random stairs, ramps, gaps and spots; nobody tuned to them.
 [[nodiscard]] Part random_part(std::uint64_t seed);
 
+// One depth for as long as its time limit, begun at the override that holds the reference.
+[[nodiscard]] Part long_cut(double depth_m);
+
 // The part as it is cut once: draws what the surroundings leave open.
 [[nodiscard]] Part in_surroundings(Part part, Surroundings surroundings, std::uint64_t seed);
 

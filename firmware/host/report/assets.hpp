@@ -5,13 +5,15 @@
 
 namespace cutforce::firmware::host::assets {
 
-extern const std::string_view kPage;          // page.html, with {{places}} to fill
-extern const std::string_view kStyle;         // page.css
-extern const std::string_view kScript;        // page.js
-extern const std::string_view kPlotScript;    // uplot/uPlot.iife.min.js
-extern const std::string_view kPlotStyle;     // uplot/uPlot.min.css
-extern const std::string_view kPlotLicence;   // uplot/LICENSE
-extern const std::string_view kTuningPage;    // tuning.html, with {{places}} to fill
-extern const std::string_view kTuningScript;  // tuning.js
+extern const std::string_view kPage;           // page.html, with {{places}} to fill
+extern const std::string_view kStyle;          // page.css
+extern const std::string_view kScript;         // page.js
+extern const std::string_view kPlotScript;     // uplot/uPlot.iife.min.js
+extern const std::string_view kPlotStyle;      // uplot/uPlot.min.css
+extern const std::string_view kPlotLicence;    // uplot/LICENSE
+extern const std::string_view kTuningPage;     // tuning.html, with {{places}} to fill
+extern const std::string_view kTuningScript;   // tuning.js
+extern const std::string_view kComparePage;    // compare.html, with {{places}} to fill
+extern const std::string_view kCompareScript;  // compare.js
 
 }  // namespace cutforce::firmware::host::assets
