@@ -256,15 +256,15 @@ class BasicControlPath {
     switch (cut.phase) {
       case CutPhase::kAir:
         return {.wanted_pct = approach_pct_,
-                .mode = kForesees<L> ? kLaw : LawMode::kTrack,
+                .mode = foresees(law_) ? kLaw : LawMode::kTrack,
                 .may_rise = true,
                 .controlling = true};
       case CutPhase::kEntry:
       case CutPhase::kCut:
-        if (cut.falling && !kForesees<L>) return stay;
+        if (cut.falling && !foresees(law_)) return stay;
         return {.wanted_pct = kHighest_pct, .mode = kLaw, .may_rise = true, .controlling = true};
       case CutPhase::kExit:
-        if (!kForesees<L>) return stay;
+        if (!foresees(law_)) return stay;
         return {.wanted_pct = sent_pct, .mode = kLaw, .may_rise = false, .controlling = true};
     }
     return stay;

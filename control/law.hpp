@@ -4,8 +4,8 @@
 // estimates are dealt with around it (control_path.hpp), and it learns of them from one number,
 // the override that really acted. Bumpless switching follows from Mode: a law that is not in
 // charge still runs every tick and follows the override of whoever is, so that its first own
-// answer continues from there. This holds for enabling, for the end of an air cut, for a held
-// estimate, and for a change of law (let all run, put one in charge).
+// answer continues from there. This holds for enabling, for the end of an air cut and for a held
+// estimate. A law that did not run, because another was chosen, catches up (law_set.hpp).
 #pragma once
 
 #include <concepts>
@@ -52,14 +52,21 @@ struct LawOutput {
 }
 
 // A law that predicts the force from the override it sent says so with
-// `static constexpr bool kForesees = true`. It is asked in the air too, where its answer is an
-// upper bound of the approach, and while the force falls or the cut may be over, where its answer
-// may only lower; it knows which fall is its own doing, and must itself not rise after one that is
-// not. For any other law a steep fall is taken for a broken tool (cut_state.hpp).
+// `static constexpr bool kForesees = true`, or with `bool foresees() const noexcept` where it may
+// change. It is asked in the air too, where its answer is an upper bound of the approach, and while
+// the force falls or the cut may be over, where its answer may only lower; it knows which fall is
+// its own doing, and must itself not rise after one that is not. For any other law a steep fall is
+// taken for a broken tool (cut_state.hpp).
 template <class L>
-inline constexpr bool kForesees = requires {
-  requires L::kForesees;
-};
+[[nodiscard]] constexpr bool foresees(const L& law) noexcept {
+  if constexpr (requires { law.foresees(); }) {
+    return law.foresees();
+  } else if constexpr (requires { L::kForesees; }) {
+    return L::kForesees;
+  } else {
+    return false;
+  }
+}
 
 template <class L>
 concept Law = std::is_trivially_copyable_v<L> && std::is_trivially_copyable_v<typename L::State> &&
@@ -69,7 +76,7 @@ concept Law = std::is_trivially_copyable_v<L> && std::is_trivially_copyable_v<ty
   { law.step(input) }
   noexcept->std::same_as<LawOutput>;
   { fixed.state() }
-  noexcept->std::same_as<const typename L::State&>;
+  noexcept->std::convertible_to<typename L::State>;
   { law.restore(state) }
   noexcept;
 };

@@ -45,7 +45,7 @@ class SampleGate {
     // different times, begin a new time. 0: never.
     std::uint32_t clock_limit;
 
-    // kPeriod: not in 1 us..0.1 s; kLimit: not positive or above 1e9; kGapLimit: shorter than two
+    // kPeriod: not in 1 us..0.5 s; kLimit: not positive or above 1e9; kGapLimit: shorter than two
     // periods or longer than 2 s; kBridgeLimit, kClockLimit: above 1e6.
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
   };
@@ -169,7 +169,7 @@ class SampleGate {
 constexpr std::expected<void, SampleGate::ConfigError> SampleGate::Config::check() const noexcept {
   constexpr float kMost = 1e9F;  // its square is still a float
   constexpr std::uint32_t kMostCount = 1'000'000;
-  if (!(sample_period_s >= 1e-6F && sample_period_s <= 0.1F))
+  if (!(sample_period_s >= 1e-6F && sample_period_s <= 0.5F))
     return std::unexpected{ConfigError::kPeriod};
   for (const float limit : {voltage_limit_v, current_limit_a, speed_limit_rad_s, power_limit_w})
     if (!(limit > 0.0F && limit <= kMost)) return std::unexpected{ConfigError::kLimit};

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include "firmware/configuration_control.hpp"
+
 namespace cutforce::firmware {
 namespace {
 
@@ -49,9 +51,9 @@ std::expected<Derived, ConfigurationError> derive(const Machine& m) noexcept {
     return std::unexpected{ConfigurationError::kRating};
   Derived d{};
   d.sample_period_s = 1.0F / m.sample_rate_hz;
-  d.samples_per_estimate = whole(m.estimate_period_s * m.sample_rate_hz);
+  d.samples_per_estimate = whole(estimate_period_s(m) * m.sample_rate_hz);
   if (d.samples_per_estimate == 0) return std::unexpected{ConfigurationError::kEstimatePeriod};
-  d.estimates_per_control = whole(m.control_period_s / m.estimate_period_s);
+  d.estimates_per_control = whole(m.control_period_s / estimate_period_s(m));
   if (d.estimates_per_control == 0) return std::unexpected{ConfigurationError::kControlPeriod};
   d.resistance_ohm = m.winding == Winding::kDelta
                          ? star_equivalent_resistance(m.stator_resistance_ohm)
@@ -64,6 +66,16 @@ std::expected<Derived, ConfigurationError> derive(const Machine& m) noexcept {
   d.resistance_sigma_ratio = m.stator_resistance_sigma_ratio > kLeastResistanceSigma_ratio
                                  ? m.stator_resistance_sigma_ratio
                                  : kLeastResistanceSigma_ratio;
+  return d;
+}
+
+// With a dynamometer the motor's blocks stand still. They are made for a rate that suits them, not
+// for the dynamometer's, which may be one sample a control period.
+Derived for_motor(const Machine& m, Derived d) noexcept {
+  if (m.estimator != EstimatorName::kDynamometer) return d;
+  d.sample_period_s = 1e-3F;
+  d.samples_per_estimate = 1;
+  d.estimates_per_control = 50;
   return d;
 }
 
@@ -261,71 +273,13 @@ estimator::TorquePath::Config torque_path(const Machine& m, const Derived& d) no
       .minimum_speed_rad_s = m.minimum_speed_rad_s};
 }
 
-control::OverrideCode override_code(OverrideCode code) noexcept {
-  switch (code) {
-    case OverrideCode::kFanucFv:
-      return control::OverrideCode::kFanucFv;
-    case OverrideCode::kFanucOv10:
-      return control::OverrideCode::kFanucOv10;
-    case OverrideCode::kSiemensGray:
-      return control::OverrideCode::kSiemensGray;
-    case OverrideCode::kSiemensBinary:
-      return control::OverrideCode::kSiemensBinary;
-    case OverrideCode::kBinary:
-      break;
-  }
-  return control::OverrideCode::kBinary;
-}
-
-control::ControlPath::Config controller(const Machine& m, float period_s) noexcept {
-  // Without a controller the path still runs, on a reference that means nothing.
-  const bool used = m.controller != ControllerName::kNone && m.force_reference_n > 0.0F;
-  const float reference_n = used ? m.force_reference_n : 1000.0F;
-  const float on_ratio = used && m.cut_threshold_n > 0.0F ? m.cut_threshold_n / reference_n : 0.13F;
-  const bool coarse = m.override_step_pct > 5.0F;
-  const float initial_pct = m.override_initial_pct;
-  return {.force_reference_n = reference_n,
-          .approach_pct = initial_pct,
-          .neutral_pct = initial_pct,
-          .fallback_pct = 70.0F,
-          .fall_pct_s = 5.0F,
-          .code = override_code(m.override_code),
-          .force_input = {.stale_ticks = 2,
-                          .hold_ticks = 4,
-                          .recover_ticks = 2,
-                          .negative_tolerance_n = 0.1F * reference_n,
-                          .highest_n = 100.0F * reference_n},
-          .cut_state = {.period_s = period_s,
-                        .on_ratio = on_ratio,
-                        .off_ratio = 0.77F * on_ratio,
-                        .entry_s = 0.15F,
-                        .lost_s = period_s > 0.5F ? period_s : 0.5F,
-                        .drop_ratio = 0.1F},
-          .law = {.period_s = period_s,
-                  .form = control::PiController::Form::kVelocity,
-                  .proportional_pct_n = used ? m.pi_proportional_pct_n : 0.14F,
-                  .integral_pct_n_s = used ? m.pi_integral_pct_n_s : 0.8F,
-                  .tracking_s = period_s},
-          .feed_override = {.period_s = period_s,
-                            .floor_pct = m.override_floor_pct,
-                            .ceiling_pct = m.override_ceiling_pct,
-                            .step_pct = coarse ? 10U : 1U,
-                            .hysteresis_pct = coarse ? 1.0F : 0.1F,
-                            .slew_up_pct_s = m.slew_up_pct_s,
-                            .slew_down_pct_s = m.slew_down_pct_s,
-                            .initial_pct = initial_pct},
-          .applied_override = {.delay_ticks = 4,
-                               .confirm_ticks = 3,
-                               .tolerance_pct = 1.0F,
-                               .initial_pct = static_cast<std::uint8_t>(initial_pct + 0.5F)}};
-}
-
 }  // namespace
 
 std::expected<ControlLoop::Config, ConfigurationError> make_loop_config(const Machine& m) noexcept {
   const auto derived = derive(m);
   if (!derived) return std::unexpected{derived.error()};
   const Derived& d = *derived;
+  const Derived motor = for_motor(m, d);
   const std::uint32_t samples = d.samples_per_estimate * d.estimates_per_control;
   return ControlLoop::Config{
       .estimator = m.estimator,
@@ -338,16 +292,17 @@ std::expected<ControlLoop::Config, ConfigurationError> make_loop_config(const Ma
       .rated_torque_nm = m.rated_torque_nm,
       .voltage_lead_s = m.voltage_lead_s,
       .force_minimum_speed_rad_s = m.minimum_speed_rad_s,
+      .programmed_speed_rad_s = m.programmed_speed_rad_s,
       .gate = gate(m, d),
       .front_end = front_end(m),
-      .health = health(m, d),
-      .calibration = {.sample_period_s = d.sample_period_s,
+      .health = health(m, motor),
+      .calibration = {.sample_period_s = motor.sample_period_s,
                       .shortest_s = 0.15F,
                       .shortest_periods = 4.0F,
                       .gain_limit_ratio = 0.05F,
                       .three_currents = m.current_w_present},
-      .fused = fused(m, d),
-      .path = torque_path(m, d),
+      .fused = fused(m, motor),
+      .path = torque_path(m, motor),
       .load_friction = {.linear_ratio = {.speed_rad_s = m.load_friction_speed_rad_s,
                                          .value = m.load_friction_ratio},
                         .quadratic_1_nm = {.speed_rad_s = m.load_friction_speed_rad_s,
@@ -355,7 +310,7 @@ std::expected<ControlLoop::Config, ConfigurationError> make_loop_config(const Ma
       .force = {.gear_ratio = m.gear_ratio,
                 .minimum_speed_rad_s = m.minimum_speed_rad_s,
                 .diameter_sigma_m = 0.0F},
-      .controller = controller(m, d.sample_period_s * static_cast<float>(samples))};
+      .controller = control_path_config(m, d.sample_period_s * static_cast<float>(samples))};
 }
 
 std::expected<ControlLoop, ConfigurationFailure> make_loop(const Machine& machine) noexcept {

@@ -6,9 +6,6 @@ namespace {
 using estimator::SampleGate;
 using hal::Signal;
 
-constexpr float kForceMost_n = 1e9F;  // beyond any dynamometer; a sum of them stays finite
-constexpr float kDiameterMost_m = 1e3F;
-
 }  // namespace
 
 ControlLoop::ControlLoop(const Config& config) noexcept
@@ -83,25 +80,6 @@ void ControlLoop::restart() noexcept {
   own_.force_count = own_.force_due = 0;
 }
 
-void ControlLoop::note_commands(const hal::Sample& sample) noexcept {
-  if (sample.has(Signal::kFeedActive)) {
-    // An active feed may still be the approach: contact is told from the torque then.
-    own_.feed = sample.feed_active <= 0.5F ? 1U : 0U;  // NaN: not known
-  }
-  if (sample.has(Signal::kWorkpieceDiameter)) {
-    const float diameter_m = sample.workpiece_diameter_m;
-    own_.diameter_m = diameter_m > 0.0F && diameter_m < kDiameterMost_m ? diameter_m : 0.0F;
-  }
-  if (sample.has(Signal::kEnable)) own_.enabled = sample.enable > 0.5F ? 1U : 0U;
-  own_.override_reported = sample.has(Signal::kOverrideApplied) ? 1U : 0U;
-  own_.override_reported_pct = sample.override_applied_pct;
-  if (sample.has(Signal::kMeasuredForce) && sample.measured_force_n < kForceMost_n &&
-      sample.measured_force_n > -kForceMost_n) {
-    own_.dynamometer_n += sample.measured_force_n;
-    ++own_.dynamometer_count;
-  }
-}
-
 auto ControlLoop::step(const hal::Sample& sample) noexcept -> std::optional<LoopOutput> {
   std::uint32_t present = 0;
   if (sample.has(Signal::kSpeed)) present |= SampleGate::kSpeed;
@@ -116,16 +94,37 @@ auto ControlLoop::step(const hal::Sample& sample) noexcept -> std::optional<Loop
   if (gated.verdict == SampleGate::Verdict::kDrop) return std::nullopt;
   if (gated.verdict == SampleGate::Verdict::kRestart) restart();
   note_commands(sample);
+  note_slow(gated.present);
+  const bool by_motor = config_.estimator != EstimatorName::kDynamometer;
+  if (by_motor) observe_motor(gated);
 
+  own_.time_ns = sample.time_ns;
+  // The very first sample ends no interval: the windows close at whole periods after it. A force,
+  // though, stands for the period that ends with it, so that each can have its answer.
+  own_.elapsed_periods += own_.started != 0 || !by_motor ? gated.elapsed_periods : 0.0F;
+  own_.started = 1;
+  if (own_.elapsed_periods < static_cast<float>(config_.samples_per_estimate) - 0.5F) {
+    return std::nullopt;
+  }
+  own_.elapsed_periods = 0.0F;
+  return close_estimate();
+}
+
+void ControlLoop::note_slow(std::uint32_t present) noexcept {
+  const SampleGate::Values& values = gate_.values();
+  own_.speed_rad_s = values.speed_rad_s;
+  own_.speed_present = (present & SampleGate::kSpeed) != 0 ? 1U : 0U;
+  own_.meter_w = values.power_w;
+  own_.meter_present = (present & SampleGate::kPower) != 0 ? 1U : 0U;
+  if (own_.speed_present == 0) return;
+  own_.speed_sum_rad_s += values.speed_rad_s;
+  ++own_.speed_count;
+}
+
+void ControlLoop::observe_motor(const SampleGate::Output& gated) noexcept {
   const SampleGate::Values& values = gate_.values();
   const estimator::FrontEnd::Output front =
       front_end_.step({.voltage_v = values.voltage_v, .current_a = values.current_a});
-  const bool speed_valid = (gated.present & SampleGate::kSpeed) != 0;
-  const bool meter_valid = (gated.present & SampleGate::kPower) != 0;
-  own_.speed_rad_s = values.speed_rad_s;
-  own_.speed_present = speed_valid ? 1U : 0U;
-  own_.meter_w = values.power_w;
-  own_.meter_present = meter_valid ? 1U : 0U;
   // Samples that are missing or held shift the phase of all that follow in the window.
   if (gated.missing_samples != 0 || gated.verdict == SampleGate::Verdict::kBridge) {
     calibration_.close();
@@ -146,58 +145,34 @@ auto ControlLoop::step(const hal::Sample& sample) noexcept -> std::optional<Loop
                    .current_residual_a = front.current_residual_a,
                    .elapsed_periods = gated.elapsed_periods,
                    .at_end_channels = gated.at_end_channels});
-  if (config_.estimator == EstimatorName::kFused) {
-    fused_.step({.motor = front.motor,
-                 .speed_rad_s = values.speed_rad_s,
-                 .power_meter_w = values.power_w,
-                 .elapsed_periods = gated.elapsed_periods,
-                 .speed_valid = speed_valid,
-                 .meter_valid = meter_valid});
-  } else if (config_.estimator != EstimatorName::kDynamometer) {
-    const auto path =
-        path_.step({.motor = front.motor,
-                    .speed_rad_s = values.speed_rad_s,
-                    .power_meter_w = values.power_w,
-                    .motor_valid = true,
-                    .speed_valid = speed_valid,
-                    .meter_valid = meter_valid,
-                    .feed = own_.feed == 1 ? estimator::Feed::kAir : estimator::Feed::kUnknown});
-    if (path) {
-      own_.path = *path;
-      own_.has_path = 1;
-    }
-  }
-
-  own_.time_ns = sample.time_ns;
-  // The very first sample ends no interval: the windows close at whole periods after it.
-  own_.elapsed_periods += own_.started != 0 ? gated.elapsed_periods : 0.0F;
-  own_.started = 1;
-  if (own_.elapsed_periods < static_cast<float>(config_.samples_per_estimate) - 0.5F) {
-    return std::nullopt;
-  }
-  own_.elapsed_periods = 0.0F;
-  return close_estimate();
+  estimate_from(front, gated.elapsed_periods);
 }
 
-void ControlLoop::control_tick(LoopOutput& out) noexcept {
-  const bool valid = own_.force_count > 0 && own_.force_due == 0;
-  const float count = own_.force_count > 0 ? static_cast<float>(own_.force_count) : 1.0F;
-  const auto controlled = controller_.step({.force_n = own_.force_n / count,
-                                            .force_sigma_n = own_.force_sigma_n / count,
-                                            .force_age_ticks = 0,
-                                            .override_reported_pct = own_.override_reported_pct,
-                                            .spindle_ratio = 1.0F,
-                                            .force_valid = valid,
-                                            .override_reported = own_.override_reported != 0,
-                                            .enable = config_.control && own_.enabled != 0,
-                                            .part_start = false});
-  command_ = {.time_ns = own_.time_ns,
-              .override_pct = controlled.override_pct,
-              .override_code = controlled.override_code,
-              .controlling = controlled.controlling};
-  own_.force_n = own_.force_sigma_n = 0.0F;
-  own_.force_count = own_.force_due = 0;
-  out.control_tick = true;
+void ControlLoop::estimate_from(const estimator::FrontEnd::Output& front,
+                                float elapsed_periods) noexcept {
+  const bool speed_valid = own_.speed_present != 0;
+  const bool meter_valid = own_.meter_present != 0;
+  if (config_.estimator == EstimatorName::kFused) {
+    fused_.step({.motor = front.motor,
+                 .speed_rad_s = own_.speed_rad_s,
+                 .power_meter_w = own_.meter_w,
+                 .elapsed_periods = elapsed_periods,
+                 .speed_valid = speed_valid,
+                 .meter_valid = meter_valid});
+    return;
+  }
+  const auto path =
+      path_.step({.motor = front.motor,
+                  .speed_rad_s = own_.speed_rad_s,
+                  .power_meter_w = own_.meter_w,
+                  .motor_valid = true,
+                  .speed_valid = speed_valid,
+                  .meter_valid = meter_valid,
+                  .feed = own_.feed == 1 ? estimator::Feed::kAir : estimator::Feed::kUnknown});
+  if (path) {
+    own_.path = *path;
+    own_.has_path = 1;
+  }
 }
 
 }  // namespace cutforce::firmware

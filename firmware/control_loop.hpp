@@ -6,6 +6,7 @@
 //
 // Two rates hang on the sample count, no clock is read: the estimate period (1 ms) and the control
 // period (50 ms, whole estimate periods). Time stamps mark the end of the window they describe.
+// With a dynamometer the motor is not looked at, and one sample may be a whole control period.
 // The whole loop is a value: state() and restore() continue bit for bit.
 #pragma once
 
@@ -57,6 +58,7 @@ class ControlLoop {
     float rated_torque_nm;
     float voltage_lead_s;
     float force_minimum_speed_rad_s;
+    float programmed_speed_rad_s;  // of the motor; 0: not known
     estimator::SampleGate::Config gate;
     estimator::FrontEnd::Config front_end;
     estimator::SignalHealth::Config health;
@@ -79,6 +81,8 @@ class ControlLoop {
     float speed_rad_s = 0.0F;      // as measured
     float shaft_rad_s = 0.0F;      // as estimated
     std::uint32_t speed_present = 0;
+    float speed_sum_rad_s = 0.0F;  // over the control period so far
+    std::uint32_t speed_count = 0;
     float meter_w = 0.0F;
     std::uint32_t meter_present = 0;
     std::uint32_t force_due = 0;  // estimates in the control period that had no force
@@ -92,6 +96,8 @@ class ControlLoop {
     estimator::FaultSet faults{};  // since the last output
     std::uint32_t feed = 0;        // 0 unknown, 1 idle, 2 active
     std::uint32_t enabled = 1;
+    std::uint32_t part_signal = 0;  // as it was in the last sample
+    std::uint32_t part_start = 0;   // 1: a part has started in the control period so far
     std::uint32_t override_reported = 0;
     float override_reported_pct = 0.0F;
     estimator::Calibration calibration{};
@@ -128,6 +134,9 @@ class ControlLoop {
 
   void restart() noexcept;
   void note_commands(const hal::Sample& sample) noexcept;
+  void note_slow(std::uint32_t present) noexcept;
+  void observe_motor(const estimator::SampleGate::Output& gated) noexcept;
+  void estimate_from(const estimator::FrontEnd::Output& front, float elapsed_periods) noexcept;
   void calibrate(const estimator::FusedObserver::Output& fused) noexcept;
   void apply_calibration(const estimator::IdleCalibration::Result& result) noexcept;
   void watch_health(LoopOutput& out) noexcept;

@@ -77,9 +77,10 @@ struct Machine {
   std::array<float, 3> load_friction_1_nm;         // g(omega), P3 (8)
 
   // [spindle] and workpiece
-  float gear_ratio;            // motor turns per spindle turn
-  float workpiece_diameter_m;  // or tool diameter (milling); 0: not given
-  float minimum_speed_rad_s;   // below it there is no estimate
+  float gear_ratio;              // motor turns per spindle turn
+  float workpiece_diameter_m;    // or tool diameter (milling); 0: not given
+  float minimum_speed_rad_s;     // below it there is no estimate
+  float programmed_speed_rad_s;  // motor speed that the program asks for; 0: not given
 
   // [power_meter]
   float meter_scale_ratio;
@@ -121,5 +122,12 @@ struct Machine {
   friend constexpr bool operator==(const Machine&, const Machine&) noexcept = default;
 };
 static_assert(std::is_trivially_copyable_v<Machine>);
+
+// Time between two estimates. One a sample, where a dynamometer is slower than the usual period.
+[[nodiscard]] constexpr float estimate_period_s(const Machine& m) noexcept {
+  const bool slow = m.estimator == EstimatorName::kDynamometer && m.sample_rate_hz > 0.0F &&
+                    m.estimate_period_s * m.sample_rate_hz < 0.999F;
+  return slow && m.estimate_period_s > 0.0F ? 1.0F / m.sample_rate_hz : m.estimate_period_s;
+}
 
 }  // namespace cutforce::firmware

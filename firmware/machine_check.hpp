@@ -148,19 +148,40 @@ inline constexpr auto kMachineRules = std::to_array<MachineRule>({
      [](const Machine& m) noexcept { return detail::increases(m.load_friction_speed_rad_s); },
      "the speeds do not increase",
      "give three different speeds, the lowest first"},
+    {{"sample_rate_hz", "estimator"},
+     [](const Machine& m) noexcept {
+       return m.sample_rate_hz == 0.0F || m.sample_rate_hz >= 100.0F ||
+              m.estimator == EstimatorName::kDynamometer;
+     },
+     "too slow for an estimate from voltages and currents",
+     "sample at 1 kHz or more, at 100 Hz at least, or choose the estimator dynamometer"},
+    {{"estimate_period_s", "estimator"},
+     [](const Machine& m) noexcept {
+       return m.estimate_period_s <= 0.1F || m.estimator == EstimatorName::kDynamometer;
+     },
+     "too long for an estimate from voltages and currents",
+     "give 0.001, at most 0.1"},
     {{"estimate_period_s", "sample_rate_hz"},
      [](const Machine& m) noexcept {
-       return m.sample_rate_hz == 0.0F ||
+       return m.sample_rate_hz == 0.0F || m.estimate_period_s < estimate_period_s(m) ||
               detail::is_multiple(m.estimate_period_s, 1.0F / m.sample_rate_hz);
      },
      "the estimate period is not a whole number of samples",
      "give a multiple of 1 / sample_rate_hz"},
     {{"control_period_s", "estimate_period_s"},
      [](const Machine& m) noexcept {
-       return detail::is_multiple(m.control_period_s, m.estimate_period_s);
+       return m.estimate_period_s < estimate_period_s(m) ||
+              detail::is_multiple(m.control_period_s, m.estimate_period_s);
      },
      "the control period is not a whole number of estimate periods",
      "give a multiple of estimate_period_s"},
+    {{"control_period_s", "sample_rate_hz"},
+     [](const Machine& m) noexcept {
+       return !(m.estimate_period_s < estimate_period_s(m)) ||
+              detail::is_multiple(m.control_period_s, 1.0F / m.sample_rate_hz);
+     },
+     "the control period is not a whole number of samples",
+     "give a multiple of 1 / sample_rate_hz"},
     {{"estimator", "power_meter_present"},
      [](const Machine& m) noexcept {
        return m.power_meter_present || (m.estimator != EstimatorName::kMeasured &&

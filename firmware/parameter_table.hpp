@@ -117,7 +117,7 @@ inline constexpr std::string_view kDerived = "derived from the rating";
                               "Whether the motor's speed is measured."),
       flag<&M::power_meter_present>(0x0104, "power_meter_present", true, true, kConstruction,
                                     "Whether the drive's own power output is connected."),
-      number<&M::sample_rate_hz>(0x0105, "sample_rate_hz", "Hz", {100, 200000}, 0, 0, kConstruction,
+      number<&M::sample_rate_hz>(0x0105, "sample_rate_hz", "Hz", {2, 200000}, 0, 0, kConstruction,
                                  "Samples a second.", "from the recording"),
       triple<&M::voltage_gain_ratio>(
           0x0106, "voltage_gain_ratio", "", {-100, 100}, {1, 1, 1}, {1, 1, 1}, kIdle,
@@ -228,6 +228,11 @@ inline constexpr std::string_view kDerived = "derived from the rating";
       number<&M::minimum_speed_rad_s>(0x0403, "minimum_speed_rad_s", "rad/s", {0.1F, 2000}, 10, 10,
                                       kConstruction,
                                       "Motor speed below which there is no estimate."),
+      number<&M::programmed_speed_rad_s>(
+          0x0404, "programmed_speed_rad_s", "rad/s", {0.1F, 20000}, 0, 0, kAnyTime,
+          "Motor speed that the program asks for: a feed per turn follows the speed, and with it "
+          "the force.",
+          "not given, the speed is taken to be as programmed"),
 
       // [power_meter]
       number<&M::meter_scale_ratio>(0x0501, "meter_scale_ratio", "", {0.001F, 1000}, 1, 1, kIdle,
@@ -245,7 +250,7 @@ inline constexpr std::string_view kDerived = "derived from the rating";
       // [estimator]
       choice<&M::estimator>(0x0601, "estimator", EstimatorName::kFused, EstimatorName::kFused,
                             kConstruction, "Which estimate feeds the output."),
-      number<&M::estimate_period_s>(0x0602, "estimate_period_s", "s", {0.00005F, 0.1F}, 0.001F,
+      number<&M::estimate_period_s>(0x0602, "estimate_period_s", "s", {0.00005F, 0.5F}, 0.001F,
                                     0.001F, kConstruction,
                                     "Time between two estimates, whole samples long."),
       number<&M::control_period_s>(0x0603, "control_period_s", "s", {0.001F, 1}, 0.05F, 0.05F,

@@ -33,7 +33,9 @@ enum class Signal : std::uint8_t {
   kWorkpieceDiameter,
   kFeedRate,
   kEnable,
+  kPartStart,
 };
+inline constexpr unsigned kSignalCount = 15;
 
 [[nodiscard]] constexpr std::uint32_t bit(Signal signal) noexcept {
   return std::uint32_t{1} << static_cast<unsigned>(signal);
@@ -52,6 +54,7 @@ struct Sample {
   float workpiece_diameter_m;      // may change while cutting
   float feed_m_s;                  // as the CNC reports it
   float enable;                    // 1: control allowed
+  float part_start;                // 1 where the program of a part, or a repeated block, starts
   std::uint32_t present;           // bit(Signal) of each value that is there
 
   [[nodiscard]] constexpr bool has(Signal signal) const noexcept {

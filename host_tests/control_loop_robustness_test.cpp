@@ -98,11 +98,11 @@ class Vandal {
   }
 
   void spoil_one(Sample& s) {
-    const std::array<float*, 14> fields{
+    const std::array<float*, 15> fields{
         &s.voltage_v[0],     &s.voltage_v[1], &s.voltage_v[2],         &s.current_a[0],
         &s.current_a[1],     &s.current_a[2], &s.speed_rad_s,          &s.power_meter_w,
         &s.measured_force_n, &s.feed_active,  &s.override_applied_pct, &s.workpiece_diameter_m,
-        &s.feed_m_s,         &s.enable,
+        &s.feed_m_s,         &s.enable,       &s.part_start,
     };
     spoil(*fields[random_() % fields.size()], random_);
   }

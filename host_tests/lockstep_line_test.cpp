@@ -13,7 +13,7 @@ TEST(LockstepLine, ReadsOneSampleWithEveryColumn) {
   const auto block = parse_lockstep_line(
       R"({"t_s":1.5,"v_un_v":1,"v_vn_v":2,"v_wn_v":-3,"i_u_a":4,"i_v_a":5.5,"i_w_a":-9.5,)"
       R"("speed_rad_s":100,"power_meter_w":2000,"measured_force_n":300,"feed_active":true,)"
-      R"("override_pct":90,"workpiece_diameter_mm":50,"feed_mm_min":120,"enable":1})",
+      R"("override_pct":90,"workpiece_diameter_mm":50,"feed_mm_min":120,"enable":1,"part_start":true})",
       1);
   ASSERT_TRUE(block) << block.error().text();
   ASSERT_EQ(block->samples.size(), 1U);
@@ -30,7 +30,8 @@ TEST(LockstepLine, ReadsOneSampleWithEveryColumn) {
   EXPECT_FLOAT_EQ(sample.workpiece_diameter_m, 0.05F);
   EXPECT_FLOAT_EQ(sample.feed_m_s, 0.002F);
   EXPECT_FLOAT_EQ(sample.enable, 1.0F);
-  EXPECT_EQ(sample.present, (1U << 14U) - 1U);
+  EXPECT_FLOAT_EQ(sample.part_start, 1.0F);
+  EXPECT_EQ(sample.present, (1U << kSignalCount) - 1U);
 }
 
 TEST(LockstepLine, ReadsABlockWithASingleNumberForAllOfIt) {

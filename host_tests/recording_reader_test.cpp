@@ -69,13 +69,13 @@ TEST(RecordingReader, PutsEveryColumnWhereItBelongs) {
       text_of({kFirst, "# winding: delta\n# note: a: b\n# only a comment\n",
                "feed_mm_min,colour,true_cutting_force_n,t_s,v_wu_v,v_vw_v,v_uv_v,i_w_a,i_v_a,i_u_a,"
                "speed_rad_s,power_meter_w,measured_force_n,feed_active,override_pct,enable,"
-               "workpiece_diameter_mm,drive_airgap_torque_nm,true_airgap_torque_nm,"
+               "part_start,workpiece_diameter_mm,drive_airgap_torque_nm,true_airgap_torque_nm,"
                "true_load_torque_nm,true_cutting_torque_nm\n",
-               "120,red,9,0.000050,3,2,1,6,5,4,7,8,10,1,90,0,50,14,11,12,13\n"}));
+               "120,red,9,0.000050,3,2,1,6,5,4,7,8,10,1,90,0,1,50,14,11,12,13\n"}));
   auto reader = RecordingReader::open(path);
   ASSERT_TRUE(reader) << reader.error().text();
   EXPECT_EQ(reader->voltage_kind(), hal::host::VoltageKind::kLineToLine);
-  EXPECT_EQ(reader->columns().size(), 21U);
+  EXPECT_EQ(reader->columns().size(), 22U);
   EXPECT_EQ(reader->columns()[1], "colour");
   ASSERT_EQ(reader->metadata().size(), 2U);
   EXPECT_EQ(reader->metadata()[0], (hal::host::Metadata{"winding", "delta", 2}));
@@ -93,9 +93,10 @@ TEST(RecordingReader, PutsEveryColumnWhereItBelongs) {
   EXPECT_EQ(sample.feed_active, 1.0F);
   EXPECT_EQ(sample.override_applied_pct, 90.0F);
   EXPECT_EQ(sample.enable, 0.0F);
+  EXPECT_EQ(sample.part_start, 1.0F);
   EXPECT_EQ(sample.workpiece_diameter_m, 0.05F);
   EXPECT_EQ(sample.feed_m_s, 0.002F);
-  EXPECT_EQ(sample.present, (1U << 14U) - 1U);
+  EXPECT_EQ(sample.present, (1U << hal::kSignalCount) - 1U);
   EXPECT_EQ(reader->read(block).value(), 0U);
   EXPECT_EQ(reader->read(block).value(), 0U);
 

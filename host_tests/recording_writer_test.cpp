@@ -29,7 +29,7 @@ using hal::host::TruthReader;
 using hal::host::VoltageKind;
 using host_tests::ScratchFolder;
 
-constexpr std::uint32_t kAllSignals = (1U << 14U) - 1U;
+constexpr std::uint32_t kAllSignals = (1U << hal::kSignalCount) - 1U;
 constexpr std::uint32_t kAllTruths = (1U << 5U) - 1U;
 constexpr std::uint32_t kAlways = 0b11111U;  // three voltages, two currents
 

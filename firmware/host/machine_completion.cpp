@@ -184,7 +184,9 @@ std::expected<LoadedMachine, std::vector<InputError>> complete(MachineFile file)
   check_rules(file);
   if (!file.errors.empty()) return std::unexpected{std::move(file.errors)};
   const Machine& machine = file.machine;
-  if (machine.controller != ControllerName::kNone && machine.workpiece_diameter_m == 0.0F) {
+  const bool by_torque = machine.estimator != EstimatorName::kDynamometer;
+  if (by_torque && machine.controller != ControllerName::kNone &&
+      machine.workpiece_diameter_m == 0.0F) {
     warnings.push_back(
         "workpiece_diameter_m is not given: unless the signals carry the diameter there "
         "is torque but no force, and the controller stays idle");

@@ -82,7 +82,8 @@ class Tokens final : public nlohmann::json_sax<nlohmann::json> {
   bool boolean(bool value) override {
     const bool known = depth_ > 0 && ignored_ == 0 && column_ != kUnknown;
     if (known && kColumns[column_].signal != Signal::kEnable &&
-        kColumns[column_].signal != Signal::kFeedActive) {
+        kColumns[column_].signal != Signal::kFeedActive &&
+        kColumns[column_].signal != Signal::kPartStart) {
       return wrong_type(value ? "true" : "false");
     }
     return number(value ? 1.0 : 0.0, value ? "true" : "false");

@@ -5,8 +5,8 @@
 //
 // Keys are the column names of a recording, version 1. Each value is a number, or an array of
 // numbers of the length of t_s; a single number beside arrays holds for the whole block. null, as a
-// value or in an array, means that the value does not exist. feed_active and enable may be true or
-// false. Unknown keys are ignored whatever they hold; true_* keys are unknown.
+// value or in an array, means that the value does not exist. feed_active, enable and part_start may
+// be true or false. Unknown keys are ignored whatever they hold; true_* keys are unknown.
 #pragma once
 
 #include <cstddef>

@@ -52,6 +52,7 @@ constexpr std::array kColumns{
     sample_column("feed_mm_min", Signal::kFeedRate, offsetof(Sample, feed_m_s),
                   kMillimetresPerMinute),
     sample_column("enable", Signal::kEnable, offsetof(Sample, enable)),
+    sample_column("part_start", Signal::kPartStart, offsetof(Sample, part_start)),
     truth_column("true_airgap_torque_nm", TruthSignal::kAirGapTorque,
                  offsetof(Truth, airgap_torque_nm)),
     truth_column("true_load_torque_nm", TruthSignal::kLoadTorque, offsetof(Truth, load_torque_nm)),

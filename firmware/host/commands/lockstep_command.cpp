@@ -129,7 +129,8 @@ void add_lockstep(CLI::App& program, Action& action) {
   options->machine.add_to(*command);
   command
       ->add_option("--sample-rate", options->sample_rate_hz,
-                   "Samples a second; it wins over the machine file")
+                   "Samples a second; it wins over the machine file. With the estimator "
+                   "dynamometer it may be left out: a sample each control period")
       ->type_name("HZ")
       ->check(CLI::PositiveNumber);
   command
@@ -144,6 +145,10 @@ Examples:
   cutforce lockstep --machine lathe.toml --sample-rate 5000
   {"t_s": 0.0002, "v_un_v": 101.2, "v_vn_v": -80.5, "v_wn_v": -20.7, "i_u_a": 9.1, "i_v_a": -3.3,
    "i_w_a": -5.8, "speed_rad_s": 104.7}                                          (on one line)
+
+With --estimator dynamometer a line needs measured_force_n alone, and each line is a control tick:
+  cutforce lockstep --machine lathe.toml --estimator dynamometer --controller pi
+  {"t_s": 0.05, "measured_force_n": 412.0}
 
 A line that cannot be understood is answered by {"error": ...} and ends the dialogue (exit status 2).)");
   command->callback([options, &action] { action = [options] { return perform(*options); }; });

@@ -87,6 +87,11 @@ std::expected<LoadedMachine, std::vector<InputError>> requested_machine(
     const MachineRequest& request) {
   MachineFile file = begin(request);
   apply_options(file, request);
+  // A dynamometer alone sends what the controller asks for, one force a tick.
+  if (file.machine.estimator == EstimatorName::kDynamometer &&
+      file.machine.sample_rate_hz == 0.0F && file.machine.control_period_s > 0.0F) {
+    file.machine.sample_rate_hz = 1.0F / file.machine.control_period_s;
+  }
   return complete(std::move(file));
 }
 

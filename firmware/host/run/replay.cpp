@@ -48,7 +48,7 @@ class WatchedReplay {
 
 hal::host::RecordingInfo info_of(const RecordingReader& reader) {
   std::uint32_t signals = 0;
-  for (unsigned k = 0; k <= static_cast<unsigned>(hal::Signal::kEnable); ++k) {
+  for (unsigned k = 0; k < hal::kSignalCount; ++k) {
     const auto signal = static_cast<hal::Signal>(k);
     if (reader.has(signal)) signals |= hal::bit(signal);
   }

@@ -35,8 +35,10 @@ float& value_of(Sample& sample, Signal signal) noexcept {
       return sample.feed_m_s;
     case Signal::kEnable:
       return sample.enable;
+    case Signal::kPartStart:
+      break;
   }
-  return sample.enable;
+  return sample.part_start;
 }
 
 bool SignalFaults::pass(double time_s, Sample& sample) noexcept {

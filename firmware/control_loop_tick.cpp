@@ -1,0 +1,66 @@
+#include "firmware/control_loop.hpp"
+#include "firmware/spindle_ratio.hpp"
+
+// What the control tick is told besides the force, and the tick itself.
+
+namespace cutforce::firmware {
+namespace {
+
+using hal::Signal;
+
+constexpr float kForceMost_n = 1e9F;  // beyond any dynamometer; a sum of them stays finite
+constexpr float kDiameterMost_m = 1e3F;
+
+}  // namespace
+
+void ControlLoop::note_commands(const hal::Sample& sample) noexcept {
+  if (sample.has(Signal::kFeedActive)) {
+    // An active feed may still be the approach: contact is told from the torque then.
+    own_.feed = sample.feed_active <= 0.5F ? 1U : 0U;  // NaN: not known
+  }
+  if (sample.has(Signal::kWorkpieceDiameter)) {
+    const float diameter_m = sample.workpiece_diameter_m;
+    own_.diameter_m = diameter_m > 0.0F && diameter_m < kDiameterMost_m ? diameter_m : 0.0F;
+  }
+  // A start that is held is still one start.
+  const bool part = sample.has(Signal::kPartStart) && sample.part_start > 0.5F;
+  if (part && own_.part_signal == 0) own_.part_start = 1;
+  own_.part_signal = part ? 1U : 0U;
+  if (sample.has(Signal::kEnable)) own_.enabled = sample.enable > 0.5F ? 1U : 0U;
+  own_.override_reported = sample.has(Signal::kOverrideApplied) ? 1U : 0U;
+  own_.override_reported_pct = sample.override_applied_pct;
+  if (sample.has(Signal::kMeasuredForce) && sample.measured_force_n < kForceMost_n &&
+      sample.measured_force_n > -kForceMost_n) {
+    own_.dynamometer_n += sample.measured_force_n;
+    ++own_.dynamometer_count;
+  }
+}
+
+void ControlLoop::control_tick(LoopOutput& out) noexcept {
+  const bool valid = own_.force_count > 0 && own_.force_due == 0;
+  const float count = own_.force_count > 0 ? static_cast<float>(own_.force_count) : 1.0F;
+  const float speed_rad_s =
+      own_.speed_count > 0 ? own_.speed_sum_rad_s / static_cast<float>(own_.speed_count) : 0.0F;
+  const auto controlled =
+      controller_.step({.force_n = own_.force_n / count,
+                        .force_sigma_n = own_.force_sigma_n / count,
+                        .force_age_ticks = 0,
+                        .override_reported_pct = own_.override_reported_pct,
+                        .spindle_ratio = spindle_ratio(speed_rad_s, config_.programmed_speed_rad_s),
+                        .force_valid = valid,
+                        .override_reported = own_.override_reported != 0,
+                        .enable = config_.control && own_.enabled != 0,
+                        .part_start = own_.part_start != 0});
+  command_ = {.time_ns = own_.time_ns,
+              .override_pct = controlled.override_pct,
+              .override_code = controlled.override_code,
+              .controlling = controlled.controlling};
+  own_.part_start = 0;
+  own_.speed_sum_rad_s = 0.0F;
+  own_.speed_count = 0;
+  own_.force_n = own_.force_sigma_n = 0.0F;
+  own_.force_count = own_.force_due = 0;
+  out.control_tick = true;
+}
+
+}  // namespace cutforce::firmware
