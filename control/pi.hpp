@@ -10,6 +10,9 @@
 // anti-windup: what a limit, a slew rate, an air cut or the CNC took away is not remembered, what
 // mere rounding took away is, else every increment below half a step would be lost and the loop
 // would rest at a wrong force. With T_t = T both forms are the same law.
+//
+// Supervised, both gains are lowered together while the process gain that is seen leaves them less
+// than the margin of gain_supervision.hpp, and the law publishes what it saw.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +20,9 @@
 #include <expected>
 #include <type_traits>
 
+#include "control/gain_supervision.hpp"
 #include "control/law.hpp"
+#include "control/velocity_form.hpp"
 
 namespace cutforce::control {
 
@@ -32,6 +37,7 @@ class PiController {
     float proportional_pct_n;
     float integral_pct_n_s;
     float tracking_s;  // position form: time in which the integral gives way, at least the period
+    bool supervise;    // lower the gains where the process would make them unstable
 
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       if (!(period_s > 0.0F && period_s <= 10.0F)) return std::unexpected{ConfigError::kPeriod};
@@ -61,6 +67,7 @@ class PiController {
   struct State {
     float wanted_pct = 100.0F;  // U(i-1)
     float error_n = 0.0F;       // E(i-1)
+    GainSupervision supervision{};
   };
 
   // Fails iff check() does.
@@ -71,24 +78,19 @@ class PiController {
   }
 
   [[nodiscard]] constexpr Output step(const Input& input) noexcept {
-    const float error_n = input.force_reference_n - input.force_n;  // (C1)
-    const float base_pct =
-        std::clamp(state_.wanted_pct, input.override_applied_pct - input.override_tolerance_pct,
-                   input.override_applied_pct + input.override_tolerance_pct);  // (C2)
-    switch (input.mode) {
-      case LawMode::kActive:
-        state_.wanted_pct = std::clamp(wanted_pct(base_pct, error_n), -kFarPct, kFarPct);
-        state_.error_n = error_n;
-        return law_answer(state_.wanted_pct);
-      case LawMode::kTrack:
-        state_.error_n = error_n;
-        break;
-      case LawMode::kHold:
-        break;
-    }
-    // Following: P1 (4) from here with E(i-1) = E(i) moves by the integral part alone.
-    state_.wanted_pct = base_pct;
-    return law_answer(input.override_applied_pct);
+    if (!supervise_) return law_answer(velocity_form_pct(state_, input, gains_));
+    GainSupervision& seen = state_.supervision;
+    seen.observe(input);
+    const float scale = seen.scale_ratio(highest_process_gain_n_pct_);
+    const float override_pct =
+        velocity_form_pct(state_, input,
+                          {.proportional_pct_n = scale * gains_.proportional_pct_n,
+                           .integral_pct_n = scale * gains_.integral_pct_n,
+                           .tracking_ratio = gains_.tracking_ratio});
+    return {.override_pct = override_pct,
+            .process_gain_n_pct = seen.highest_n_pct(),
+            .process_gain_sigma_ratio = seen.sigma_ratio(),
+            .stability_margin_ratio = seen.margin_ratio(highest_process_gain_n_pct_)};
   }
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
@@ -96,29 +98,23 @@ class PiController {
 
  private:
   static constexpr float kGainLimit = 1e4F;
-  static constexpr float kFarPct = 1e4F;  // far beyond every limit, and finite
 
   explicit constexpr PiController(const Config& config) noexcept
-      : proportional_pct_n_(config.proportional_pct_n),
-        integral_pct_n_(config.integral_pct_n_s * config.period_s),
-        // The velocity form is the position form that gives way at once.
-        tracking_ratio_(config.form == Form::kVelocity ? 1.0F
-                                                       : config.period_s / config.tracking_s) {}
+      : gains_{.proportional_pct_n = config.proportional_pct_n,
+               .integral_pct_n = config.integral_pct_n_s * config.period_s,
+               // The velocity form is the position form that gives way at once.
+               .tracking_ratio =
+                   config.form == Form::kVelocity ? 1.0F : config.period_s / config.tracking_s},
+        highest_process_gain_n_pct_(config.highest_process_gain_n_pct()),
+        supervise_(config.supervise) {}
 
-  // (C3), (C4) in one: I(i-1) = U(i-1) - Kp E(i-1) needs no state of its own.
-  [[nodiscard]] constexpr float wanted_pct(float base_pct, float error_n) const noexcept {
-    const float before_pct = state_.wanted_pct + tracking_ratio_ * (base_pct - state_.wanted_pct);
-    return before_pct + proportional_pct_n_ * (error_n - state_.error_n) +
-           integral_pct_n_ * error_n;
-  }
-
-  float proportional_pct_n_;
-  float integral_pct_n_;
-  float tracking_ratio_;
+  VelocityGains gains_;
+  float highest_process_gain_n_pct_;
+  bool supervise_;
   State state_{};
 };
 
 static_assert(Law<PiController>);
-static_assert(sizeof(PiController::State) == 2 * 4);
+static_assert(sizeof(PiController::State) == 7 * 4);
 
 }  // namespace cutforce::control

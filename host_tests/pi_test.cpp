@@ -24,6 +24,7 @@ constexpr PiController::Config kZieglerNichols{
     .proportional_pct_n = 0.286F,
     .integral_pct_n_s = 1.38F,
     .tracking_s = 0.05F,
+    .supervise = false,
 };
 static_assert(kZieglerNichols.check());
 
@@ -115,7 +116,8 @@ TEST(PiController, LosesStabilityAtTheClosedFormGainOnADeadbeatPlant) {
                                      .form = PiController::Form::kVelocity,
                                      .proportional_pct_n = 0.05F,
                                      .integral_pct_n_s = 2.5F,
-                                     .tracking_s = 0.1F};
+                                     .tracking_s = 0.1F,
+                                     .supervise = false};
   EXPECT_NEAR(kP1.highest_process_gain_n_pct(), 5.7143F, 1e-3F);
   std::mt19937 random(4);
   for (int i = 0; i < 300; ++i) {

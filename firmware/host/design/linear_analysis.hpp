@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "control/pi.hpp"
+#include "control/pid.hpp"
 
 namespace cutforce::firmware::host {
 
@@ -65,6 +66,8 @@ struct DiscreteController {
 [[nodiscard]] DiscreteController proportional(double gain);
 // (C3), and (C4) away from every limit: without saturation both are one linear law.
 [[nodiscard]] DiscreteController controller_of(const control::PiController::Config& config);
+// (C42).
+[[nodiscard]] DiscreteController controller_of(const control::Pid::Config& config);
 
 // D_c D_g + N_c N_g.
 [[nodiscard]] Polynomial closed_loop(const DiscretePlant& plant,

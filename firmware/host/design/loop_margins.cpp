@@ -105,20 +105,6 @@ double smallest_distance(const OpenLoop& loop, const std::vector<double>& grid) 
 
 }  // namespace
 
-DiscreteController proportional(double gain) { return {{gain}, {1.0}}; }
-
-DiscreteController controller_of(const control::PiController::Config& config) {
-  const double proportional = static_cast<double>(config.proportional_pct_n);
-  const double integral =
-      static_cast<double>(config.integral_pct_n_s) * static_cast<double>(config.period_s);
-  return {{proportional + integral, -proportional}, {1.0, -1.0}};
-}
-
-Polynomial closed_loop(const DiscretePlant& plant, const DiscreteController& controller) {
-  return sum(product(controller.denominator, plant.denominator),
-             product(controller.numerator, plant.numerator));
-}
-
 Ultimate ultimate(const DiscretePlant& plant) {
   Ultimate first{.gain = kInfinity, .period_s = 0.0};
   for (const auto& crossing : real_crossings({plant, proportional(1.0)}, angles())) {

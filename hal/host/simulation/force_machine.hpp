@@ -78,11 +78,11 @@ class ForceMachine {
   [[nodiscard]] ProcessInput process_input() noexcept;
 
   ForceMachineConfig config_;
+  ProfileCursor speed_{};  // before what it is read for
   std::uint32_t steps_per_sample_;
   std::uint64_t steps_ = 0;
   double turns_ = 0.0;
   double turns_s_ = 0.0;
-  ProfileCursor speed_{};
   FeedServo feed_;
   CuttingProcess process_;
   ForceSensor sensor_;

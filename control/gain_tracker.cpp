@@ -1,0 +1,263 @@
+#include "control/gain_tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace cutforce::control {
+namespace {
+
+using estimator::exp_bounded;
+using estimator::magnitude;
+
+enum Covariance : std::size_t { kFF, kFs, kFK, kSS, kSK, kKK };
+
+constexpr float kDrift_ratio_sqrt_s = 0.018F;  // of the gain, in a steady cut
+constexpr float kTrend_ratio_sqrt_s = 0.168F;  // more of it for each unit of trend
+constexpr float kTrendFloor = 0.1F;
+constexpr float kTrendMemory_s = 0.25F;
+constexpr float kTwiceThreshold_ratio = 0.81F;  // two readings in a row need this of the threshold
+constexpr float kJump_ratio = 1.0F;     // spread of a jump, of the gain
+constexpr float kEntry_variance = 2.0F;  // of the first gain, of the square of the remembered one
+constexpr float kSettled_ratio = 0.1F;   // spread of a gain that is remembered
+constexpr float kNothing = 0.01F;       // probability that an alarm means nothing
+constexpr float kBadFit = 9.0F;
+constexpr float kBadFitEach = 4.0F;
+constexpr std::array<float, 3> kOnset{0.05F, 0.35F, 0.7F};  // parts of a tick
+
+constexpr float square(float x) noexcept { return x * x; }
+
+}  // namespace
+
+auto GainTracker::make(const Config& config) noexcept -> std::expected<GainTracker, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return GainTracker{config};
+}
+
+GainTracker::GainTracker(const Config& config) noexcept
+    : config_(config),
+      lag_(LagStep::of(config.period_s, 0.0F, config.cut_lag_s, config.sensor_lag_s)) {
+  for (std::size_t k = 0; k < kOnset.size(); ++k) {
+    partial_[k] = LagStep::of((1.0F - kOnset[k]) * config.period_s, 0.0F, config.cut_lag_s,
+                              config.sensor_lag_s);
+  }
+  state_.memory_n = config.gain_n;
+  settle_in(true);
+}
+
+// Into the air with the last gain remembered, or out of it with that gain.
+void GainTracker::settle_in(bool air) noexcept {
+  State& s = state_;
+  s.air = air ? 1U : 0U;
+  s.gain_n = air ? 0.0F : s.memory_n;
+  s.covariance = {};
+  s.covariance[kSS] = square(config_.noise_n);
+  s.covariance[kKK] = air ? 0.0F : square(0.3F * s.gain_n);
+  s.correlation = 0.0F;
+  s.power = 1.0F;
+}
+
+void GainTracker::predict(float feed, float drift) noexcept {  // (C76), (C77)
+  State& s = state_;
+  const float drive = s.gain_n * feed;
+  s.sensed_n = lag_.sensed * s.sensed_n + lag_.sensed_force * s.force_n + lag_.sensed_input * drive;
+  s.force_n = lag_.cut * s.force_n + (1.0F - lag_.cut) * drive;
+
+  const float fk = (1.0F - lag_.cut) * feed;
+  const float sk = lag_.sensed_input * feed;
+  const float ff = lag_.cut, sf = lag_.sensed_force, ss = lag_.sensed;
+  const auto p = s.covariance;
+  // Rows of A P.
+  const float f_f = ff * p[kFF] + fk * p[kFK];
+  const float f_s = ff * p[kFs] + fk * p[kSK];
+  const float f_k = ff * p[kFK] + fk * p[kKK];
+  const float s_f = sf * p[kFF] + ss * p[kFs] + sk * p[kFK];
+  const float s_s = sf * p[kFs] + ss * p[kSS] + sk * p[kSK];
+  const float s_k = sf * p[kFK] + ss * p[kSK] + sk * p[kKK];
+  s.covariance[kFF] = ff * f_f + fk * f_k;
+  s.covariance[kFs] = sf * f_f + ss * f_s + sk * f_k;
+  s.covariance[kFK] = f_k;
+  s.covariance[kSS] = sf * s_f + ss * s_s + sk * s_k;
+  s.covariance[kSK] = s_k;
+  s.covariance[kKK] = p[kKK] + square(drift * s.gain_n);
+}
+
+void GainTracker::correct(float innovation_n, float variance_n2) noexcept {  // (C78)
+  State& s = state_;
+  const auto p = s.covariance;
+  const float over = 1.0F / variance_n2;
+  const float gain_f = p[kFs] * over, gain_s = p[kSS] * over, gain_k = p[kSK] * over;
+  s.force_n += gain_f * innovation_n;
+  s.sensed_n += gain_s * innovation_n;
+  s.gain_n += gain_k * innovation_n;
+  s.covariance = {p[kFF] - gain_f * p[kFs], p[kFs] - gain_f * p[kSS], p[kFK] - gain_f * p[kSK],
+                  p[kSS] - gain_s * p[kSS], p[kSK] - gain_s * p[kSK], p[kKK] - gain_k * p[kSK]};
+  for (const std::size_t k : {kFF, kSS, kKK}) s.covariance[k] = std::max(s.covariance[k], 0.0F);
+}
+
+// The base and each moment's response go one tick on, and the reading is weighed. (C79), (C80)
+void GainTracker::follow(float feed, float reading_n, float variance_n2,
+                         std::uint32_t tick) noexcept {
+  State& s = state_;
+  const float drive = s.base.gain_n * feed;
+  s.base.sensed_n = lag_.sensed * s.base.sensed_n + lag_.sensed_force * s.base.force_n +
+                    lag_.sensed_input * drive;
+  s.base.force_n = lag_.cut * s.base.force_n + (1.0F - lag_.cut) * drive;
+  const float residual_n = reading_n - s.base.sensed_n;
+  s.residual += square(residual_n) / variance_n2;
+  for (std::size_t k = 0; k < kMoments; ++k) {
+    Moment& m = s.moments[k];
+    const std::size_t onset = k / kOnset.size();
+    if (tick < onset) continue;
+    if (tick == onset) {
+      const LagStep& part = partial_[k % kOnset.size()];
+      m.sensed = part.sensed_input * feed;
+      m.force = (1.0F - part.cut) * feed;
+    } else {
+      m.sensed = lag_.sensed * m.sensed + lag_.sensed_force * m.force + lag_.sensed_input * feed;
+      m.force = lag_.cut * m.force + (1.0F - lag_.cut) * feed;
+    }
+    m.fit += m.sensed * residual_n / variance_n2;
+    m.weight += square(m.sensed) / variance_n2;
+  }
+}
+
+// Mean and spread over the moments and over "nothing happened". (C81), (C82)
+void GainTracker::conclude() noexcept {
+  State& s = state_;
+  const float prior = 1.0F / s.prior_variance_n2;
+  std::array<float, kMoments + 1> cost{}, jump_n{}, variance_n2{};
+  s.misfit = s.residual;
+  cost[kMoments] = s.residual + 2.0F * -estimator::log_positive(kNothing);
+  variance_n2[kMoments] = s.base.variance_n2;
+  for (std::size_t k = 0; k < kMoments; ++k) {
+    const Moment& m = s.moments[k];
+    const float sharpness = prior + m.weight;
+    jump_n[k] = (s.prior_mean_n * prior + m.fit) / sharpness;
+    variance_n2[k] = 1.0F / sharpness;
+    const float misfit = square(s.prior_mean_n) * prior + s.residual - sharpness * square(jump_n[k]);
+    cost[k] = misfit + estimator::log_positive(sharpness * s.prior_variance_n2) +
+              2.0F * 1.8018F;  // ln 6, about: the other probability over the moments
+    s.misfit = std::min(s.misfit, misfit);
+  }
+  std::array<float, kMoments + 1> share{};
+  float sum = 0.0F;
+  const float best = *std::ranges::min_element(cost);
+  for (std::size_t k = 0; k <= kMoments; ++k) {
+    share[k] = exp_bounded(0.5F * (best - cost[k]));
+    sum += share[k];
+  }
+  float gain_n = 0.0F, force_n = 0.0F, sensed_n = 0.0F;
+  for (std::size_t k = 0; k <= kMoments; ++k) {
+    share[k] /= sum;
+    const Moment m = k < kMoments ? s.moments[k] : Moment{};
+    gain_n += share[k] * jump_n[k];
+    force_n += share[k] * jump_n[k] * m.force;
+    sensed_n += share[k] * jump_n[k] * m.sensed;
+  }
+  s.covariance = {};
+  for (std::size_t k = 0; k <= kMoments; ++k) {
+    const Moment m = k < kMoments ? s.moments[k] : Moment{};
+    const std::array<float, 3> apart{jump_n[k] * m.force - force_n, jump_n[k] * m.sensed - sensed_n,
+                                     jump_n[k] - gain_n};
+    const std::array<float, 3> along{m.force, m.sensed, 1.0F};
+    std::size_t at = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (std::size_t b = a; b < 3; ++b) {
+        s.covariance[at++] += share[k] * (apart[a] * apart[b] + variance_n2[k] * along[a] * along[b]);
+      }
+    }
+  }
+  s.gain_n = std::max(s.base.gain_n + gain_n, 0.0F);
+  s.force_n = s.base.force_n + force_n;
+  s.sensed_n = s.base.sensed_n + sensed_n;
+}
+
+void GainTracker::begin_jump(const Input& input, float variance_n2) noexcept {
+  State& s = state_;
+  s.base = s.past;
+  s.moments = {};
+  s.residual = 0.0F;
+  const bool from_air = !(s.base.gain_n > 0.05F * s.memory_n);
+  s.prior_mean_n = from_air ? s.memory_n : 0.0F;
+  s.prior_variance_n2 = from_air ? kEntry_variance * square(s.memory_n)
+                                 : square(kJump_ratio * s.base.gain_n);
+  follow(s.past.feed, s.past.reading_n, variance_n2, 0);
+  follow(input.feed, input.reading_n, variance_n2, 1);
+  s.samples = 2;
+}
+
+void GainTracker::coast(float feed) noexcept {
+  predict(feed, kDrift_ratio_sqrt_s * std::sqrt(config_.period_s));
+  state_.samples = 0;
+  state_.ticks = 0;
+}
+
+auto GainTracker::step(const Input& input) noexcept -> Output {
+  State& s = state_;
+  const bool air = input.air && s.samples == 0;
+  if (air != (s.air != 0) && s.samples == 0) settle_in(air);
+  const Point before{.force_n = s.force_n,
+                     .sensed_n = s.sensed_n,
+                     .gain_n = s.gain_n,
+                     .feed = input.feed,
+                     .reading_n = input.reading_n,
+                     .variance_n2 = s.covariance[kKK]};
+  const float trend = std::clamp(s.correlation / std::max(s.power, 0.5F), 0.0F, 1.0F);
+  const float drift = (kDrift_ratio_sqrt_s +
+                       kTrend_ratio_sqrt_s * std::max(trend - kTrendFloor, 0.0F)) *
+                      std::sqrt(config_.period_s);
+  const float noise_n2 = std::max(square(config_.noise_ratio * input.reading_n) +
+                                      square(config_.noise_n),
+                                  square(input.reading_sigma_n));
+  Output out{};
+  predict(input.feed, drift);
+  const float innovation_n = input.reading_n - s.sensed_n;
+  const float variance_n2 = s.covariance[kSS] + noise_n2;
+  out.innovation = innovation_n / std::sqrt(variance_n2);
+
+  if (s.samples > 0) {
+    ++s.samples;
+    follow(input.feed, input.reading_n, noise_n2, s.samples - 1);
+    conclude();
+    if (s.misfit > kBadFit + kBadFitEach * static_cast<float>(s.samples)) {
+      begin_jump(input, noise_n2);
+      conclude();
+      out.jumped = true;
+    }
+  } else {
+    const float size = magnitude(out.innovation);
+    const bool again = size > kTwiceThreshold_ratio * config_.jump_threshold &&
+                       out.innovation * s.last_innovation > 0.0F &&
+                       magnitude(s.last_innovation) >
+                           kTwiceThreshold_ratio * config_.jump_threshold;
+    const bool entry = air && innovation_n > input.entry_n;
+    if ((size > config_.jump_threshold || again || entry) && s.ticks >= 2 &&
+        (!air || innovation_n > 0.0F)) {
+      s.rising = innovation_n > 0.0F ? 1U : 0U;
+      begin_jump(input, noise_n2);
+      conclude();
+      out.jumped = true;
+    } else {
+      correct(innovation_n, variance_n2);
+      s.gain_n = std::max(s.gain_n, 0.0F);
+      const float memory = config_.period_s / (kTrendMemory_s + config_.period_s);
+      s.correlation += memory * (out.innovation * s.last_innovation - s.correlation);
+      s.power += memory * (square(out.innovation) - s.power);
+      if (!air && s.covariance[kKK] < square(kSettled_ratio * s.gain_n)) s.memory_n = s.gain_n;
+    }
+  }
+  s.last_innovation = s.samples > 0 ? 0.0F : out.innovation;
+  if (s.samples > 0) s.correlation = 0.0F;
+  out.resolving = s.samples > 0;
+  out.rising = s.rising != 0;
+  if (s.samples >= kSamples) s.samples = 0;
+  s.past = before;
+  s.ticks = std::min(s.ticks + 1U, 2U);
+  out.force_n = std::max(s.force_n, 0.0F);
+  out.gain_n = s.gain_n;
+  out.gain_sigma_n = std::sqrt(s.covariance[kKK]);
+  out.trend = trend;
+  return out;
+}
+
+}  // namespace cutforce::control

@@ -1,0 +1,254 @@
+#include "control/predictive.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace cutforce::control {
+namespace {
+
+using estimator::exp_bounded;
+using estimator::power_positive;
+
+constexpr float kSpreadFree = 0.04F;  // spread of the gain that is not feared
+constexpr float kSpreadMost = 0.6F;
+constexpr float kLead = 0.5862F;      // of a gain that drifts upwards
+constexpr float kAfterJump_s = 0.35F;
+constexpr float kAfterJump_1_s = 4.835F;  // faster recovery while a jump is being learned
+constexpr float kDeepRetreat_s = 0.4F;    // after a jump
+constexpr float kAbove_ratio = 1.04F;
+constexpr float kFarAbove_ratio = 1.15F;
+constexpr float kMiddle_s = 0.2F;
+constexpr float kOver_ratio = 1.05F;      // static force of a command, over the reference
+constexpr float kOverAfterJump_ratio = 1.15F;
+constexpr float kKeep_ratio = 0.03F;      // of the override: not worth a change at first
+constexpr float kKeepFade_s = 1.5F;
+constexpr float kCoarse_ratio = 0.04F;    // of the override: coarser steps are rounded down
+constexpr float kEntry_ratio = 0.05F;     // of the reference: a reading above it ends the air
+constexpr float kLost_ratio = 0.2F;       // of the gain before: less is a lost cut
+constexpr float kLost_s = 0.5F;
+
+}  // namespace
+
+std::expected<void, Predictive::ConfigError> Predictive::Config::check() const noexcept {
+  const auto fail = [](ConfigError error) { return std::unexpected{error}; };
+  if (!(period_s > 0.0F && period_s <= 10.0F)) return fail(ConfigError::kPeriod);
+  if (!(latency_s >= 0.0F && latency_s <= static_cast<float>(kHistory - 2) * period_s))
+    return fail(ConfigError::kLatency);
+  if (!(feed_lag_s >= 0.0F && feed_lag_s <= 10.0F && process_lag_s > 0.0F &&
+        process_lag_s <= 10.0F && sensor_lag_s >= 0.0F && sensor_lag_s <= 10.0F))
+    return fail(ConfigError::kLags);
+  if (!(feed_exponent >= 0.3F && feed_exponent <= 1.5F)) return fail(ConfigError::kExponent);
+  if (!(process_gain_n > 0.0F && process_gain_n <= 1e7F)) return fail(ConfigError::kGain);
+  if (!(noise_ratio >= 0.0F && noise_ratio < 1.0F && noise_n > 0.0F && noise_n <= 1e6F))
+    return fail(ConfigError::kNoise);
+  if (!(jump_threshold >= 2.0F && jump_threshold <= 20.0F)) return fail(ConfigError::kThreshold);
+  if (!(calm_horizon_s >= 2.0F * period_s && calm_horizon_s <= 100.0F))
+    return fail(ConfigError::kHorizon);
+  if (!(recovery_1_s > 0.0F && recovery_1_s <= 100.0F)) return fail(ConfigError::kRecovery);
+  if (!(caution_ratio >= 0.0F && caution_ratio <= 3.0F)) return fail(ConfigError::kCaution);
+  if (!(floor_pct >= 0.0F && floor_pct < ceiling_pct && ceiling_pct <= 254.0F) ||
+      (step_pct != 1 && step_pct != 10))
+    return fail(ConfigError::kRange);
+  return {};
+}
+
+auto Predictive::make(const Config& config) noexcept -> std::expected<Predictive, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  const auto tracker = GainTracker::make({.period_s = config.period_s,
+                                          .cut_lag_s = config.process_lag_s,
+                                          .sensor_lag_s = config.sensor_lag_s,
+                                          .gain_n = config.process_gain_n,
+                                          .noise_ratio = config.noise_ratio,
+                                          .noise_n = config.noise_n,
+                                          .jump_threshold = config.jump_threshold});
+  if (!tracker) return std::unexpected{ConfigError::kGain};
+  return Predictive{config, *tracker};
+}
+
+Predictive::Predictive(const Config& config, const GainTracker& tracker) noexcept
+    : config_(config),
+      tracker_(tracker),
+      whole_ticks_(static_cast<std::uint32_t>(config.latency_s / config.period_s + 1e-4F)) {
+  const auto step = [&config](float length_s) {
+    return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
+  };
+  const float early_s =
+      std::max(config.latency_s - static_cast<float>(whole_ticks_) * config.period_s, 0.0F);
+  tick_ = step(config.period_s);
+  early_ = step(early_s);
+  late_ = step(config.period_s - early_s);
+  const std::array<float, kReaches> lengths{config.period_s, 2.0F * config.period_s,
+                                            std::max(kMiddle_s, 2.0F * config.period_s),
+                                            config.calm_horizon_s};
+  for (std::size_t k = 0; k < kReaches; ++k) {
+    const LagStep h = step(lengths[k]);
+    const float apart_s = config.feed_lag_s - config.process_lag_s;
+    horizons_[k] = {.length_s = lengths[k],
+                    .force = h.cut,
+                    .feed = (h.feed - h.cut) * config.feed_lag_s / apart_s};
+  }
+  state_.sent.fill(1.0F);
+  state_.feed.v = 1.0F;
+}
+
+// What the override did to the feed since the last tick: mean of v. (C70)-(C73)
+float Predictive::known_feed(float applied_pct) noexcept {
+  State& s = state_;
+  const float now = applied_pct == s.sent_pct ? s.sent[0]
+                    : applied_pct > 0.0F      ? power_positive(0.01F * applied_pct,
+                                                               config_.feed_exponent)
+                                              : 0.0F;
+  for (std::size_t k = kHistory - 1; k > 0; --k) s.sent[k] = s.sent[k - 1];
+  s.sent[0] = now;
+  s.held_s = applied_pct == s.sent_pct ? s.held_s + config_.period_s : 0.0F;
+  s.sent_pct = applied_pct;
+  const float first = s.feed.advance(early_, config_.feed_lag_s, s.sent[whole_ticks_ + 1]);
+  const float second = s.feed.advance(late_, config_.feed_lag_s, s.sent[whole_ticks_]);
+  return (early_.length_s * first + late_.length_s * second) / config_.period_s;
+}
+
+// To the end of the dead time, with the codes that are on their way. (C86)
+auto Predictive::forecast(float force_n, float drive_n) const noexcept -> Forecast {
+  FeedState feed = state_.feed;
+  const auto go = [&](const LagStep& step, float w) {
+    const float mean = feed.advance(step, config_.feed_lag_s, w);
+    force_n = step.cut * force_n + (1.0F - step.cut) * drive_n * mean;
+  };
+  if (early_.length_s > 0.0F) go(early_, state_.sent[whole_ticks_]);
+  for (std::size_t k = whole_ticks_; k > 0; --k) go(tick_, state_.sent[k - 1]);
+  return {.force_n = force_n, .feed = feed.v, .drive_n = drive_n};
+}
+
+// (C84), (C85)
+float Predictive::pessimistic_gain_n(const GainTracker::Output& seen) noexcept {
+  State& s = state_;
+  const float period_s = config_.period_s;
+  if (!(seen.gain_n > 0.0F)) {
+    s.last_gain_n = 0.0F;
+    return 0.0F;
+  }
+  if (s.last_gain_n > 0.0F && !seen.resolving) {
+    const float slope_1_s = (seen.gain_n - s.last_gain_n) / (seen.gain_n * period_s);
+    s.trend_1_s += period_s / (0.25F + period_s) * (slope_1_s - s.trend_1_s);
+  } else {
+    s.trend_1_s = 0.0F;
+  }
+  s.last_gain_n = seen.gain_n;
+  const float spread = std::min(seen.gain_sigma_n / seen.gain_n, kSpreadMost);
+  const float ahead_s = config_.latency_s + period_s + 0.5F * config_.process_lag_s;
+  const float lead = seen.trend > 0.1F ? std::clamp(kLead * s.trend_1_s * ahead_s, 0.0F, 0.3F) : 0.0F;
+  return seen.gain_n * (1.0F + config_.caution_ratio * std::max(spread - kSpreadFree, 0.0F)) *
+         (1.0F + lead);
+}
+
+// (C87)
+auto Predictive::reach(const Forecast& ahead, float reference_n) noexcept -> Reach {
+  const bool recent = state_.since_jump_s < kDeepRetreat_s;
+  if (ahead.force_n > kAbove_ratio * reference_n) {
+    return recent || ahead.force_n > kFarAbove_ratio * reference_n ? kOneTick : kMiddle;
+  }
+  return recent ? kTwoTicks : kCalm;
+}
+
+// The override that brings the force to the reference at the end of the horizon. (C88), (C89)
+float Predictive::wanted_pct(const Forecast& ahead, const Horizon& horizon,
+                             float reference_n) const noexcept {
+  if (!(ahead.drive_n > 1e-3F * reference_n)) return config_.ceiling_pct;
+  const float own = 1.0F - horizon.force - horizon.feed;
+  const float w = (reference_n - horizon.force * ahead.force_n -
+                   ahead.drive_n * horizon.feed * ahead.feed) /
+                  (ahead.drive_n * own);
+  const float over = state_.since_jump_s < kLost_s ? kOverAfterJump_ratio : kOver_ratio;
+  const float most = over * reference_n / ahead.drive_n;
+  const float limited = std::min(w, most);
+  if (!(limited > 1e-4F)) return config_.floor_pct;
+  if (limited > 1e4F) return config_.ceiling_pct;
+  return std::clamp(100.0F * power_positive(limited, 1.0F / config_.feed_exponent),
+                    config_.floor_pct, config_.ceiling_pct);
+}
+
+// A code that the CNC has, and not a new one for nothing. (C90)
+float Predictive::as_code(float wanted_pct, float sent_pct) noexcept {
+  const auto step = static_cast<float>(config_.step_pct);
+  const auto down = [step](float pct) {
+    return step * static_cast<float>(static_cast<std::int32_t>(pct / step + 1e-3F));
+  };
+  if (step > kCoarse_ratio * wanted_pct) {
+    if (wanted_pct > sent_pct - 0.15F * step && wanted_pct < sent_pct + 1.25F * step) {
+      return sent_pct;
+    }
+    return std::max(down(wanted_pct), config_.floor_pct);
+  }
+  const float fade = exp_bounded(-state_.held_s / kKeepFade_s);
+  const float keep = std::max(0.6F * step, kKeep_ratio * wanted_pct * fade);
+  const float apart = wanted_pct - sent_pct;
+  if (apart <= keep && apart >= -keep) return sent_pct;
+  return down(wanted_pct + 0.5F * step);
+}
+
+// Not with a jump upwards, and not while the tool may be broken. (C91)
+bool Predictive::may_rise(const GainTracker::Output& seen, CutPhase phase) noexcept {
+  State& s = state_;
+  if (phase == CutPhase::kAir && !seen.resolving) {
+    s.before_jump_n = 0.0F;
+    return true;
+  }
+  if (s.before_jump_n > 0.0F) {
+    const bool surely_cutting =
+        seen.gain_n - 3.0F * seen.gain_sigma_n > kLost_ratio * s.before_jump_n;
+    if (surely_cutting) s.before_jump_n = 0.0F;
+  }
+  return s.before_jump_n <= 0.0F && !(seen.jumped && seen.rising);
+}
+
+auto Predictive::step(const Input& input) noexcept -> Output {
+  State& s = state_;
+  const float speed = input.spindle_ratio > 0.0F
+                          ? power_positive(input.spindle_ratio, -config_.feed_exponent)
+                          : 1.0F;
+  const float feed = known_feed(input.override_applied_pct) * speed;
+  if (input.mode == LawMode::kHold) {
+    tracker_.coast(feed);
+    return law_answer(input.override_applied_pct);
+  }
+  const float gain_before_n = tracker_.state().gain_n;
+  const auto seen = tracker_.step({.reading_n = input.force_n,
+                                   .reading_sigma_n = input.force_sigma_n,
+                                   .feed = feed,
+                                   .entry_n = kEntry_ratio * input.force_reference_n,
+                                   .air = input.phase == CutPhase::kAir});
+  s.since_jump_s = seen.jumped ? 0.0F : std::min(s.since_jump_s + config_.period_s, 100.0F);
+  if (seen.jumped) s.before_jump_n = seen.rising ? 0.0F : std::max(gain_before_n, s.before_jump_n);
+
+  const float gain_n = pessimistic_gain_n(seen);
+  const bool rise = may_rise(seen, input.phase);
+  const float rate = s.since_jump_s < kAfterJump_s ? kAfterJump_1_s : config_.recovery_1_s;
+  const float kept = rise ? s.feared_n * exp_bounded(-rate * config_.period_s) : s.feared_n;
+  s.feared_n = input.phase == CutPhase::kAir && !seen.resolving ? 0.0F : std::max(gain_n, kept);
+
+  const Forecast ahead = forecast(seen.force_n, gain_n * speed);
+  Forecast feared = ahead;
+  feared.drive_n = s.feared_n * speed;
+  float wanted = wanted_pct(feared, horizons_[reach(ahead, input.force_reference_n)],
+                            input.force_reference_n);
+  if (!rise) wanted = std::min(wanted, input.override_applied_pct);
+  Output out = law_answer(input.mode == LawMode::kActive
+                              ? as_code(wanted, input.override_applied_pct)
+                              : input.override_applied_pct);
+  out.process_gain_n_pct = 0.01F * seen.gain_n;
+  out.process_gain_sigma_ratio = seen.gain_n > 0.0F ? seen.gain_sigma_n / seen.gain_n : 0.0F;
+  return out;
+}
+
+auto Predictive::state() const noexcept -> State {
+  State s = state_;
+  s.tracker = tracker_.state();
+  return s;
+}
+
+void Predictive::restore(const State& state) noexcept {
+  state_ = state;
+  tracker_.restore(state.tracker);
+}
+
+}  // namespace cutforce::control

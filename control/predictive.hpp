@@ -1,0 +1,121 @@
+// The predictive law: the default. From the override that was really sent it knows what the force
+// must be; what differs is the process gain. It predicts the force over the dead time with a
+// pessimistic gain and sets the override that brings it to the reference within a horizon. It
+// retreats within one tick and recovers slowly. Equations (C70)-(C99).
+//
+//   known input -> GainTracker -> pessimistic gain -> prediction over the dead time -> one step
+//   of model predictive control in closed form -> a code that the CNC has -> guards
+//
+// The loop does not depend on the process gain: control and tracking are in the logarithm of it.
+// What can destabilise it is time: a true dead time longer than the assumed one.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <expected>
+#include <type_traits>
+
+#include "control/force_model.hpp"
+#include "control/gain_tracker.hpp"
+#include "control/law.hpp"
+
+namespace cutforce::control {
+
+class Predictive {
+ public:
+  static constexpr bool kForesees = true;
+  static constexpr std::size_t kHistory = 24;  // ticks of dead time at the most
+
+  enum class ConfigError : std::uint8_t {
+    kPeriod,
+    kLatency,
+    kLags,
+    kExponent,
+    kGain,
+    kNoise,
+    kThreshold,
+    kHorizon,
+    kRecovery,
+    kCaution,
+    kRange,
+  };
+
+  struct Config {
+    float period_s;
+    float latency_s;         // from a byte on the port to a feed reference that moves
+    float feed_lag_s;        // of the feed servo
+    float process_lag_s;     // of the cut, one to one and a half turns of the spindle
+    float sensor_lag_s;      // of the force estimate
+    float feed_exponent;     // of force over feed: 0.75..1
+    float process_gain_n;    // force at 100 %, before anything is known
+    float noise_ratio;       // of the estimate, of the force
+    float noise_n;           // of the estimate, beside it
+    float jump_threshold;    // in standard deviations; 4.2
+    float calm_horizon_s;    // settling time over 1.5; at least two periods
+    float recovery_1_s;      // rate at which a feared gain is forgotten
+    float caution_ratio;     // how much of the gain's spread is feared
+    float floor_pct;
+    float ceiling_pct;
+    std::uint32_t step_pct;  // 1 or 10
+
+    [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
+  };
+
+  using Input = LawInput;
+  using Output = LawOutput;
+
+  struct State {
+    GainTracker::State tracker{};
+    FeedState feed{};
+    std::array<float, kHistory> sent{};  // (u/u0)^p, newest first
+    float sent_pct = 100.0F;             // u of sent[0]
+    float feared_n = 0.0F;               // pessimistic gain K_c
+    float since_jump_s = 100.0F;
+    float before_jump_n = 0.0F;  // gain before a jump down, while the cut may be lost; else 0
+    float held_s = 0.0F;         // the present code has been sent for
+    float trend_1_s = 0.0F;      // relative slope of the gain
+    float last_gain_n = 0.0F;
+  };
+
+  // Fails iff check() does.
+  [[nodiscard]] static std::expected<Predictive, ConfigError> make(const Config& config) noexcept;
+
+  [[nodiscard]] Output step(const Input& input) noexcept;
+
+  [[nodiscard]] State state() const noexcept;
+  void restore(const State& state) noexcept;
+
+ private:
+  Predictive(const Config& config, const GainTracker& tracker) noexcept;
+
+  struct Forecast {
+    float force_n;  // at the end of the dead time
+    float feed;     // v there
+    float drive_n;  // feared gain at the present spindle speed: force for a unit of feed
+  };
+  struct Horizon {  // of the force, (C88)
+    float length_s;
+    float force;  // e_H
+    float feed;   // g_H
+  };
+  enum Reach : std::size_t { kOneTick, kTwoTicks, kMiddle, kCalm, kReaches };
+
+  [[nodiscard]] float known_feed(float applied_pct) noexcept;
+  [[nodiscard]] Forecast forecast(float force_n, float drive_n) const noexcept;
+  [[nodiscard]] float pessimistic_gain_n(const GainTracker::Output& seen) noexcept;
+  [[nodiscard]] Reach reach(const Forecast& ahead, float reference_n) noexcept;
+  [[nodiscard]] float wanted_pct(const Forecast& ahead, const Horizon& horizon,
+                                 float reference_n) const noexcept;
+  [[nodiscard]] float as_code(float wanted_pct, float sent_pct) noexcept;
+  [[nodiscard]] bool may_rise(const GainTracker::Output& seen, CutPhase phase) noexcept;
+
+  Config config_;
+  GainTracker tracker_;
+  std::uint32_t whole_ticks_;  // of the dead time
+  LagStep tick_, early_, late_;  // early_: the part of a tick before a byte arrives
+  std::array<Horizon, kReaches> horizons_;
+  State state_{};
+};
+
+}  // namespace cutforce::control
