@@ -118,6 +118,8 @@ struct Machine {
   float slew_down_pct_s;
   float cut_threshold_n;  // above it the tool is in the cut
   OverrideCode override_code;
+  float cut_drop_ratio;  // a fall of the force by more within a tick is steep; 1: never
+  float cut_lost_s;      // a force that has gone for so long is the end of the cut
 
   friend constexpr bool operator==(const Machine&, const Machine&) noexcept = default;
 };

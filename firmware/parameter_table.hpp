@@ -317,6 +317,13 @@ inline constexpr std::string_view kDerived = "derived from the rating";
       choice<&M::override_code>(0x070d, "override_code", OverrideCode::kBinary,
                                 OverrideCode::kBinary, kConstruction,
                                 "How the CNC reads the override byte."),
+      number<&M::cut_drop_ratio>(
+          0x0760, "cut_drop_ratio", "", {0.01F, 1}, 0.1F, 0.1F, kIdle,
+          "A fall of the force by more than this part of it within one tick may be a broken tool: "
+          "the override does not rise then. 1 lets it, as the papers' laws do."),
+      number<&M::cut_lost_s>(0x0761, "cut_lost_s", "s", {0.001F, 10}, 0.5F, 0.5F, kIdle,
+                             "A force that is gone for so long is the end of the cut, before that "
+                             "perhaps a broken tool; at least one control period."),
   });
 }
 

@@ -12,4 +12,7 @@ extern const std::string_view kPlotScript;   // uplot/uPlot.iife.min.js
 extern const std::string_view kPlotStyle;    // uplot/uPlot.min.css
 extern const std::string_view kPlotLicence;  // uplot/LICENSE
 
+extern const std::string_view kReproductionPage;    // reproduction.html, with {{places}} to fill
+extern const std::string_view kReproductionScript;  // reproduction.js
+
 }  // namespace cutforce::firmware::host::assets

@@ -3,8 +3,10 @@
 #   cmake -D OUTPUT=file.cpp -D ROOT=folder -P embed.cmake
 set(text "// made by embed.cmake\n#include \"firmware/host/report/assets.hpp\"\n\n"
          "namespace cutforce::firmware::host::assets {\nnamespace {\n")
-set(names kPage kStyle kScript kPlotScript kPlotStyle kPlotLicence)
-set(files page.html page.css page.js uplot/uPlot.iife.min.js uplot/uPlot.min.css uplot/LICENSE)
+set(names kPage kStyle kScript kPlotScript kPlotStyle kPlotLicence kReproductionPage
+          kReproductionScript)
+set(files page.html page.css page.js uplot/uPlot.iife.min.js uplot/uPlot.min.css uplot/LICENSE
+          reproduction.html reproduction.js)
 set(views "")
 foreach(name file IN ZIP_LISTS names files)
   file(READ ${ROOT}/${file} hex HEX)
