@@ -21,26 +21,35 @@ class EndMill {
     const double root = std::sqrt(kA1 * kA1 - 4.0 * kA0);
     const double slow = 0.5 * (kA1 - root);
     const double fast = 0.5 * (kA1 + root);
-    decay_[0] = std::exp(-slow * period_s);
-    decay_[1] = std::exp(-fast * period_s);
-    gain_[0] = kGain / root / slow;
-    gain_[1] = -kGain / root / fast;
+    pole_hz_[0] = slow;
+    pole_hz_[1] = fast;
+    for (std::size_t i = 0; i < 2; ++i) {
+      decay_[i] = std::exp(-pole_hz_[i] * period_s);
+      gain_[i] = (i == 0 ? kGain : -kGain) / root / pole_hz_[i];
+    }
   }
 
   // The force at the end of a period over which the feed was held.
   double step(double feed_mm_s, double depth_ratio) {
     double force_n = 0.0;
+    rate_n_s_ = 0.0;
     for (std::size_t i = 0; i < 2; ++i) {
       mode_n_[i] = decay_[i] * mode_n_[i] + (1.0 - decay_[i]) * gain_[i] * feed_mm_s;
       force_n += mode_n_[i];
+      rate_n_s_ += pole_hz_[i] * (gain_[i] * feed_mm_s - mode_n_[i]);
     }
     return depth_ratio * force_n;
   }
 
+  // dF/dt at 1 mm, now.
+  [[nodiscard]] double rate_n_s() const { return rate_n_s_; }
+
  private:
+  double pole_hz_[2]{};  // [1/s]
   double decay_[2]{};
   double gain_[2]{};
   double mode_n_[2]{};
+  double rate_n_s_ = 0.0;
 };
 
 // What is asked of a step response, from its first sample on.
