@@ -12,7 +12,7 @@ namespace cutforce::firmware::host {
 struct ClosedLoop {
   double reference_n = 0.0;
   double ceiling_pct = 0.0;
-  double period_s = 0.0;  // of control
+  double period_s = 0.0;    // of control
   double finished_s = 0.0;  // the path was at its end; the end of the run if it never was
 
   // At each step.
