@@ -22,42 +22,61 @@ std::string outcome_cell(const Finding& finding) {
   return "<td class=\"outcome " + std::string(word) + "\">" + word + "</td>";
 }
 
-// `first`: a cell that names the figure, once.
-std::string finding_rows(const std::vector<Finding>& findings, const std::string& first) {
+std::string head(std::initializer_list<const char*> names) {
+  std::string cells;
+  for (const char* name : names) cells += "<th scope=\"col\">" + std::string(name) + "</th>";
+  return "<thead><tr>" + cells + "</tr></thead>";
+}
+
+// `figure`: a cell that names it, once.
+std::string overview_rows(const std::vector<Finding>& findings, const std::string& figure) {
   std::string rows;
   for (const Finding& finding : findings) {
-    rows += "<tr>";
-    if (!first.empty()) rows += rows == "<tr>" ? "<td>" + first + "</td>" : "<td></td>";
-    rows += "<td>" + escaped(finding.said) + "</td><td>" + escaped(finding.got) + "</td>" +
-            outcome_cell(finding) + "<td class=\"note\">" + escaped(finding.reason) +
-            "</td></tr>\n";
+    rows += "<tr><td>" + (rows.empty() ? figure : "") + "</td><td>" + escaped(finding.said) +
+            "</td><td>" + escaped(finding.got) + "</td>" + outcome_cell(finding) + "</tr>\n";
   }
   return rows;
 }
 
-std::string finding_table(const std::string& rows, bool figure) {
-  return std::string("<div class=\"scroll\"><table class=\"findings\"><thead><tr>") +
-         (figure ? "<th scope=\"col\">Figure</th>" : "") +
-         "<th scope=\"col\">The paper says</th><th scope=\"col\">Here</th><th scope=\"col\"></th>"
-         "<th scope=\"col\">Why, or what else</th></tr></thead><tbody>\n" +
-         rows + "</tbody></table></div>\n";
+std::string link(std::string_view anchor, std::string_view text) {
+  return "<a href=\"#" + std::string(anchor) + "\">" + escaped(text) + "</a>";
 }
 
-std::string summary_section(const Reproduction& reproduction) {
-  std::string rows = finding_rows(reproduction.equations, "Equations");
+std::string overview_section(const Reproduction& reproduction) {
+  std::string rows;
   for (const JudgedFigure& judged : reproduction.figures) {
-    rows += finding_rows(judged.findings, "<a href=\"#" + std::string(judged.figure.name) + "\">" +
-                                              escaped(judged.figure.paper) + "</a>");
+    rows += overview_rows(judged.findings, link(judged.figure.name, judged.figure.paper));
   }
-  return "<section><h2>What the papers say, and what comes out</h2>\n" + finding_table(rows, true) +
-         "</section>\n";
+  rows += overview_rows(reproduction.equations, link("equations", "Equations"));
+  return "<section><h2>What the papers say, and what comes out</h2>\n<div class=\"scroll\">"
+         "<table class=\"findings overview\">" +
+         head({"Figure", "The paper says", "Here", ""}) + "<tbody>\n" + rows +
+         "</tbody></table></div></section>\n";
+}
+
+std::string finding_table(const std::vector<Finding>& findings) {
+  std::string rows;
+  for (const Finding& finding : findings) {
+    rows += "<tr><td>" + escaped(finding.said) + "</td><td>" + escaped(finding.got) + "</td>" +
+            outcome_cell(finding) + "<td class=\"note\">" + escaped(finding.reason) +
+            "</td></tr>\n";
+  }
+  return "<div class=\"scroll\"><table class=\"findings\">" +
+         head({"The paper says", "Here", "", "Why, or what else"}) + "<tbody>\n" + rows +
+         "</tbody></table></div>\n";
 }
 
 std::string figure_section(const JudgedFigure& judged) {
   const std::string name(judged.figure.name);
   return "<section id=\"" + name + "\"><h2>" + escaped(judged.figure.paper) + ": " +
          escaped(judged.figure.title) + "</h2>\n<div class=\"plots\" id=\"plots-" + name +
-         "\"></div>\n" + finding_table(finding_rows(judged.findings, ""), false) + "</section>\n";
+         "\"></div>\n" + finding_table(judged.findings) + "</section>\n";
+}
+
+std::string equation_section(const Reproduction& reproduction) {
+  if (reproduction.equations.empty()) return {};
+  return "<section id=\"equations\"><h2>The papers' equations</h2>\n" +
+         finding_table(reproduction.equations) + "</section>\n";
 }
 
 std::string check_rows(const std::vector<Finding>& findings) {
@@ -141,8 +160,9 @@ std::string reproduction_page(const Reproduction& reproduction) {
        {"lead",
         "Every run is simulated: the laws as printed, then the same corrected where they do "
         "not work. Where a statement does not come out, the table says why."},
-       {"summary", summary_section(reproduction)},
+       {"overview", overview_section(reproduction)},
        {"figures", sections},
+       {"equations", equation_section(reproduction)},
        {"checks", check_section(reproduction)},
        {"licence", escaped(assets::kPlotLicence)},
        {"data", script_safe(data.dump())},
