@@ -3,6 +3,6 @@
 
 namespace cutforce::control {
 
-template class BasicControlPath<PiController>;
+template class BasicControlPath<LawSet>;
 
 }  // namespace cutforce::control

@@ -20,6 +20,7 @@
 #pragma once
 
 #include <algorithm>
+#include <concepts>
 #include <cstdint>
 #include <expected>
 #include <type_traits>
@@ -29,8 +30,8 @@
 #include "control/feed_override.hpp"
 #include "control/force_input.hpp"
 #include "control/law.hpp"
+#include "control/law_set.hpp"
 #include "control/override_code.hpp"
-#include "control/pi.hpp"
 
 namespace cutforce::control {
 
@@ -182,6 +183,11 @@ class BasicControlPath {
             .law = law};
   }
 
+  // Puts another law in charge from the next step on (law_set.hpp).
+  constexpr void select(LawName name) noexcept requires std::same_as<L, LawSet> {
+    law_.select(name);
+  }
+
   [[nodiscard]] constexpr State state() const noexcept {
     return {.force_input = force_input_.state(),
             .cut_state = cut_state_.state(),
@@ -285,13 +291,13 @@ class BasicControlPath {
   std::uint32_t started_ = 0;
 };
 
-using ControlPath = BasicControlPath<PiController>;
+using ControlPath = BasicControlPath<LawSet>;
 
 static_assert(std::is_trivially_copyable_v<ControlPath>);
 static_assert(std::is_trivially_copyable_v<ControlPath::State> &&
               std::is_standard_layout_v<ControlPath::State>);
 static_assert(sizeof(ControlPath::State) ==
-              sizeof(ForceInput::State) + sizeof(CutState::State) + sizeof(PiController::State) +
+              sizeof(ForceInput::State) + sizeof(CutState::State) + sizeof(LawSet::State) +
                   sizeof(FeedOverride::State) + sizeof(AppliedOverride::State) + 8);
 
 }  // namespace cutforce::control

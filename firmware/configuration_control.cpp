@@ -1,5 +1,7 @@
 #include "firmware/configuration_control.hpp"
 
+#include "firmware/configuration_laws.hpp"
+
 namespace cutforce::firmware {
 namespace {
 
@@ -45,12 +47,7 @@ control::ControlPath::Config control_path_config(const Machine& m, float period_
                         .entry_s = 0.15F,
                         .lost_s = period_s > m.cut_lost_s ? period_s : m.cut_lost_s,
                         .drop_ratio = m.cut_drop_ratio},
-          .law = {.period_s = period_s,
-                  .form = control::PiController::Form::kVelocity,
-                  .proportional_pct_n = used ? m.pi_proportional_pct_n : 0.14F,
-                  .integral_pct_n_s = used ? m.pi_integral_pct_n_s : 0.8F,
-                  .tracking_s = period_s,
-                  .supervise = false},
+          .law = law_set_config(m, period_s),
           .feed_override = {.period_s = period_s,
                             .floor_pct = m.override_floor_pct,
                             .ceiling_pct = m.override_ceiling_pct,

@@ -103,6 +103,7 @@ class ControlLoop {
     estimator::Calibration calibration{};
     estimator::TorquePath::Output path{};
     std::uint32_t has_path = 0;
+    control::LawOutput law{};  // of the last control tick
     LoopOutput last{};
   };
 
@@ -126,6 +127,9 @@ class ControlLoop {
   // Of the last control tick; before the first, the neutral override.
   [[nodiscard]] const hal::Command& command() const noexcept { return command_; }
 
+  // Puts another law in charge from the next control tick on (control/law_set.hpp).
+  void select(control::LawName name) noexcept { controller_.select(name); }
+
   [[nodiscard]] State state() const noexcept;
   void restore(const State& state) noexcept;
 
@@ -147,6 +151,7 @@ class ControlLoop {
   void estimate_dynamometer(LoopOutput& out) noexcept;
   void add_force(LoopOutput& out) noexcept;
   void control_tick(LoopOutput& out) noexcept;
+  void publish_control(LoopOutput& out) const noexcept;
 
   Config config_;
   estimator::SampleGate gate_;

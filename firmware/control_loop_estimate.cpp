@@ -242,10 +242,7 @@ auto ControlLoop::close_estimate() noexcept -> LoopOutput {
     own_.estimates = 0;
     control_tick(out);
   }
-  if (config_.control) {
-    out.override_pct = static_cast<float>(command_.override_pct);
-    out.present |= LoopOutput::kOverride;
-  }
+  publish_control(out);
   own_.last = out;
   return out;
 }

@@ -55,12 +55,28 @@ void ControlLoop::control_tick(LoopOutput& out) noexcept {
               .override_pct = controlled.override_pct,
               .override_code = controlled.override_code,
               .controlling = controlled.controlling};
+  own_.law = controlled.law;
   own_.part_start = 0;
   own_.speed_sum_rad_s = 0.0F;
   own_.speed_count = 0;
   own_.force_n = own_.force_sigma_n = 0.0F;
   own_.force_count = own_.force_due = 0;
   out.control_tick = true;
+}
+
+void ControlLoop::publish_control(LoopOutput& out) const noexcept {
+  if (!config_.control) return;
+  out.override_pct = static_cast<float>(command_.override_pct);
+  out.present |= LoopOutput::kOverride;
+  if (own_.law.process_gain_n_pct > 0.0F) {
+    out.process_gain_n_pct = own_.law.process_gain_n_pct;
+    out.process_gain_sigma_ratio = own_.law.process_gain_sigma_ratio;
+    out.present |= LoopOutput::kProcessGain;
+  }
+  if (own_.law.stability_margin_ratio > 0.0F) {
+    out.stability_margin_ratio = own_.law.stability_margin_ratio;
+    out.present |= LoopOutput::kStabilityMargin;
+  }
 }
 
 }  // namespace cutforce::firmware

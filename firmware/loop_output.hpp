@@ -27,6 +27,8 @@ struct LoopOutput {
     kCuttingTorque = 1U << 4,  // with its sigma
     kCuttingForce = 1U << 5,   // with its sigma
     kOverride = 1U << 6,
+    kProcessGain = 1U << 7,  // with its sigma
+    kStabilityMargin = 1U << 8,
   };
 
   std::int64_t time_ns;  // end of the window that the row describes
@@ -39,7 +41,11 @@ struct LoopOutput {
   float cutting_force_n;
   float cutting_force_sigma_n;
   float override_pct;
-  std::uint32_t present;  // Value bits; what is not there has value 0
+  // What the law in charge knows of the process; not in a trace, whose columns are fixed.
+  float process_gain_n_pct;        // force over override, static
+  float process_gain_sigma_ratio;  // standard deviation of that, relative
+  float stability_margin_ratio;    // the process gain may be this many times the estimated one
+  std::uint32_t present;           // Value bits; what is not there has value 0
   estimator::FaultSet faults;
   Source source;
   LoopState state;

@@ -20,7 +20,17 @@ enum class EstimatorName : std::uint8_t {
   kFused,
   kDynamometer
 };
-enum class ControllerName : std::uint8_t { kNone, kPi };
+enum class ControllerName : std::uint8_t {
+  kNone,
+  kPi,
+  kPid,
+  kPoleAssignment,
+  kMrac,
+  kVariableGain,
+  kFuzzy,
+  kPredictive
+};
+enum class MracForm : std::uint8_t { kOutputError, kStateError };
 enum class PowerMode : std::uint8_t { kDotProduct, kTwoWattmeter, kFixedPowerFactor };
 enum class SpeedSource : std::uint8_t { kRotor, kSynchronous, kSlip };
 enum class SwitchMode : std::uint8_t { kAbsolute, kPositiveOnly };
@@ -118,8 +128,51 @@ struct Machine {
   float slew_down_pct_s;
   float cut_threshold_n;  // above it the tool is in the cut
   OverrideCode override_code;
+
+  // [control] the process, as the laws are told
+  float process_gain_n_pct;
+  float process_gain_least_n_pct;
+  float process_gain_most_n_pct;
+  float override_latency_s;
+  float feed_lag_s;
+  float process_lag_s;
+  float force_lag_s;
+  float feed_exponent_ratio;
+
+  // [control] one law each
+  bool pi_supervise;
+  float pid_proportional_pct_n;
+  float pid_integral_time_s;
+  float pid_derivative_time_s;
+  float pid_derivative_filter_ratio;
+  float pole_assignment_pole_1_ratio;
+  float pole_assignment_pole_2_ratio;
+  float pole_assignment_learning_ratio;
+  float mrac_model_time_s;
+  float mrac_adaptation_hz;
+  float variable_gain_open_loop_1_s;
+  float variable_gain_smoothing_s;
+  float fuzzy_error_range_n;
+  float fuzzy_change_range_n;
+  float fuzzy_step_range_pct;
+  float predictive_noise_ratio;
+  float predictive_noise_n;
+  float predictive_jump_ratio;
+  float predictive_calm_horizon_s;
+  float predictive_recovery_1_s;
+  float predictive_caution_ratio;
+
+  // [control] as the papers print it
   float cut_drop_ratio;  // a fall of the force by more within a tick is steep; 1: never
   float cut_lost_s;      // a force that has gone for so long is the end of the cut
+  float pole_assignment_printed_rate_1_pct;  // g_c; 0: not used
+  MracForm mrac_form;
+  float mrac_model_pole_1_hz;
+  float mrac_model_pole_2_hz;
+  float mrac_plant_n_mm_s2;
+  float mrac_state_scale_ratio;
+  float mrac_state_gain_ratio;  // mu
+  float mrac_feed_mm_s_pct;
 
   friend constexpr bool operator==(const Machine&, const Machine&) noexcept = default;
 };

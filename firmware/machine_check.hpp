@@ -2,32 +2,13 @@
 // machine file on the host and a machine compiled into an image (constexpr).
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <expected>
-#include <string_view>
 
-#include "firmware/parameter_table.hpp"
+#include "firmware/machine_check_control.hpp"
 
 namespace cutforce::firmware {
 
-struct MachineRule {
-  std::array<std::string_view, 4> keys;  // of the parameters it speaks of; the first is to blame
-  bool (*holds)(const Machine&) noexcept;
-  std::string_view what;
-  std::string_view remedy;
-};
-
 namespace detail {
-
-// a is n times b, n = 1, 2, ...; to the precision of a period written with few decimals.
-[[nodiscard]] constexpr bool is_multiple(float a, float b) noexcept {
-  const float ratio = a / b;
-  if (!(ratio > 0.5F && ratio < 1e6F)) return false;
-  const float nearest = static_cast<float>(static_cast<std::int32_t>(ratio + 0.5F));
-  const float error = ratio - nearest;
-  return error < 1e-3F && error > -1e-3F;
-}
 
 [[nodiscard]] constexpr bool increases(const std::array<float, 3>& values) noexcept {
   return values[0] < values[1] && values[1] < values[2];
@@ -82,7 +63,9 @@ namespace detail {
 
 }  // namespace detail
 
-inline constexpr auto kMachineRules = std::to_array<MachineRule>({
+namespace detail {
+
+inline constexpr auto kMotorRules = std::to_array<MachineRule>({
     {{"voltage_gain_ratio"},
      [](const Machine& m) noexcept { return detail::none_is_zero(m.voltage_gain_ratio); },
      "a gain of 0 removes the channel",
@@ -196,39 +179,11 @@ inline constexpr auto kMachineRules = std::to_array<MachineRule>({
      },
      "the rotor's speed is not measured",
      "choose speed_source = \"synchronous\" or \"slip\""},
-    {{"force_reference_n", "force_limit_n"},
-     [](const Machine& m) noexcept { return m.force_reference_n < m.force_limit_n; },
-     "the force to hold is not below the limit",
-     "raise force_limit_n or lower force_reference_n"},
-    {{"cut_threshold_n", "force_reference_n"},
-     [](const Machine& m) noexcept { return m.cut_threshold_n < m.force_reference_n; },
-     "the cut would be noticed only above the force to hold",
-     "lower cut_threshold_n"},
-    {{"override_floor_pct", "override_ceiling_pct"},
-     [](const Machine& m) noexcept { return m.override_floor_pct < m.override_ceiling_pct; },
-     "the floor is not below the ceiling",
-     "lower the floor or raise the ceiling"},
-    {{"override_initial_pct", "override_floor_pct", "override_ceiling_pct"},
-     [](const Machine& m) noexcept {
-       return m.override_initial_pct >= m.override_floor_pct &&
-              m.override_initial_pct <= m.override_ceiling_pct;
-     },
-     "the first override is not between floor and ceiling",
-     "give a value between the two"},
-    {{"override_step_pct"},
-     [](const Machine& m) noexcept {
-       return m.override_step_pct == 1.0F || m.override_step_pct == 10.0F;
-     },
-     "no CNC understands this step",
-     "give 1 or 10"},
-    {{"override_code", "override_step_pct", "override_ceiling_pct"},
-     [](const Machine& m) noexcept {
-       return m.override_code != OverrideCode::kFanucOv10 ||
-              (m.override_step_pct == 10.0F && m.override_ceiling_pct <= 150.0F);
-     },
-     "fanuc_ov_10 has steps of 10 % up to 150 %",
-     "set override_step_pct = 10 and override_ceiling_pct = 150 or less"},
 });
+
+}  // namespace detail
+
+inline constexpr auto kMachineRules = detail::joined(detail::kMotorRules, detail::kControlRules);
 
 // Every value within its range and every rule kept; the error is the key to blame.
 [[nodiscard]] constexpr std::expected<void, std::string_view> check(

@@ -10,6 +10,7 @@
 #include <span>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include "firmware/machine.hpp"
 
@@ -49,7 +50,9 @@ inline constexpr std::array<std::string_view, 2> kWinding{"star", "delta"};
 inline constexpr std::array<std::string_view, 2> kVoltage{"line_to_neutral", "line_to_line"};
 inline constexpr std::array<std::string_view, 5> kEstimator{"measured", "computed", "synthesized",
                                                             "fused", "dynamometer"};
-inline constexpr std::array<std::string_view, 2> kController{"none", "pi"};
+inline constexpr std::array<std::string_view, 8> kController{
+    "none", "pi", "pid", "pole_assignment", "mrac", "variable_gain", "fuzzy", "predictive"};
+inline constexpr std::array<std::string_view, 2> kMracForm{"output_error", "state_error"};
 inline constexpr std::array<std::string_view, 3> kPower{"dot_product", "two_wattmeter", "fixed_pf"};
 inline constexpr std::array<std::string_view, 3> kSpeed{"rotor", "synchronous", "slip"};
 inline constexpr std::array<std::string_view, 2> kSwitch{"absolute", "positive_only"};
@@ -65,6 +68,8 @@ template <>
 inline constexpr std::span<const std::string_view> kNames<EstimatorName>{detail::kEstimator};
 template <>
 inline constexpr std::span<const std::string_view> kNames<ControllerName>{detail::kController};
+template <>
+inline constexpr std::span<const std::string_view> kNames<MracForm>{detail::kMracForm};
 template <>
 inline constexpr std::span<const std::string_view> kNames<PowerMode>{detail::kPower};
 template <>
@@ -142,6 +147,17 @@ constexpr void set(Machine& machine, [[maybe_unused]] std::size_t element, float
   } else {
     machine.*kMember = value;
   }
+}
+
+// One table from two.
+template <class T, std::size_t kFirst, std::size_t kSecond>
+[[nodiscard]] consteval auto joined(const std::array<T, kFirst>& first,
+                                    const std::array<T, kSecond>& second) {
+  return [&]<std::size_t... I, std::size_t... J>(std::index_sequence<I...>,
+                                                 std::index_sequence<J...>) {
+    return std::array<T, kFirst + kSecond>{first[I]..., second[J]...};
+  }
+  (std::make_index_sequence<kFirst>{}, std::make_index_sequence<kSecond>{});
 }
 
 }  // namespace detail

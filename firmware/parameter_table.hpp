@@ -12,97 +12,14 @@
 #include <expected>
 #include <optional>
 
-#include "firmware/parameter.hpp"
+#include "firmware/parameter_describe.hpp"
+#include "firmware/parameter_table_control.hpp"
+#include "firmware/parameter_table_printed.hpp"
 
 namespace cutforce::firmware {
 namespace detail {
 
-// Not constexpr: reaching it stops the compilation.
-void the_key_is_not_the_members_name();
-
-template <auto kMember>
-[[nodiscard]] constexpr bool names_member(std::string_view key) noexcept {
-  constexpr std::string_view kText = __PRETTY_FUNCTION__;
-  const std::string_view tail = kText.substr(kText.find("Machine::") + 9);
-  return tail.starts_with(key) && (tail[key.size()] == ']' || tail[key.size()] == ';');
-}
-
-struct Range {
-  float minimum;
-  float maximum;
-};
-
-template <auto kMember>
-[[nodiscard]] consteval Parameter describe(std::uint16_t index, std::string_view key, Kind kind,
-                                           std::string_view unit, Range range,
-                                           std::array<float, 3> absent, std::array<float, 3> lathe,
-                                           Write write, std::string_view sentence,
-                                           std::string_view zero_means,
-                                           std::span<const std::string_view> names) {
-  if (!names_member<kMember>(key)) the_key_is_not_the_members_name();
-  return {.index = index,
-          .section = static_cast<Section>((index >> 8) - 1),
-          .kind = kind,
-          .key = key,
-          .unit = unit,
-          .minimum = range.minimum,
-          .maximum = range.maximum,
-          .zero_means = zero_means,
-          .absent = absent,
-          .lathe = lathe,
-          .write = write,
-          .sentence = sentence,
-          .names = names,
-          .get = &get<kMember>,
-          .set = &set<kMember>};
-}
-
-template <auto kMember>
-[[nodiscard]] consteval Parameter number(std::uint16_t index, std::string_view key,
-                                         std::string_view unit, Range range, float absent,
-                                         float lathe, Write write, std::string_view sentence,
-                                         std::string_view zero_means = {}) {
-  return describe<kMember>(index, key, Kind::kNumber, unit, range, {absent}, {lathe}, write,
-                           sentence, zero_means, {});
-}
-
-template <auto kMember>
-[[nodiscard]] consteval Parameter whole(std::uint16_t index, std::string_view key, Range range,
-                                        float absent, float lathe, Write write,
-                                        std::string_view sentence) {
-  return describe<kMember>(index, key, Kind::kWhole, "", range, {absent}, {lathe}, write, sentence,
-                           {}, {});
-}
-
-template <auto kMember>
-[[nodiscard]] consteval Parameter triple(std::uint16_t index, std::string_view key,
-                                         std::string_view unit, Range range,
-                                         std::array<float, 3> absent, std::array<float, 3> lathe,
-                                         Write write, std::string_view sentence) {
-  return describe<kMember>(index, key, Kind::kTriple, unit, range, absent, lathe, write, sentence,
-                           {}, {});
-}
-
-template <auto kMember>
-[[nodiscard]] consteval Parameter flag(std::uint16_t index, std::string_view key, bool absent,
-                                       bool lathe, Write write, std::string_view sentence) {
-  return describe<kMember>(index, key, Kind::kFlag, "", {0.0F, 1.0F}, {absent ? 1.0F : 0.0F},
-                           {lathe ? 1.0F : 0.0F}, write, sentence, {}, {});
-}
-
-template <auto kMember>
-[[nodiscard]] consteval Parameter choice(std::uint16_t index, std::string_view key,
-                                         MemberType<kMember> absent, MemberType<kMember> lathe,
-                                         Write write, std::string_view sentence) {
-  const auto names = kNames<MemberType<kMember>>;
-  return describe<kMember>(
-      index, key, Kind::kChoice, "", {0.0F, static_cast<float>(names.size() - 1)},
-      {static_cast<float>(absent)}, {static_cast<float>(lathe)}, write, sentence, {}, names);
-}
-
-inline constexpr std::string_view kDerived = "derived from the rating";
-
-[[nodiscard]] consteval auto parameters() {
+[[nodiscard]] consteval auto machine_parameters() {
   using M = Machine;
   using enum Write;
   return std::to_array<Parameter>({
@@ -288,48 +205,14 @@ inline constexpr std::string_view kDerived = "derived from the rating";
           0x060d, "drift_1_sqrt_s", "1/sqrt(s)", {1e-6F, 10}, 0.0095F, 0.0095F, kConstruction,
           "Drift of the load within a cut, in rated torques after a second."),
 
-      // [control]
-      choice<&M::controller>(0x0701, "controller", ControllerName::kNone, ControllerName::kPi,
-                             kConstruction, "Which law sets the feed override."),
-      number<&M::force_reference_n>(0x0702, "force_reference_n", "N", {1, 100000}, 500, 500,
-                                    kAnyTime, "Cutting force to hold."),
-      number<&M::force_limit_n>(0x0703, "force_limit_n", "N", {1, 200000}, 1000, 1000, kAnyTime,
-                                "Cutting force never to exceed."),
-      number<&M::pi_proportional_pct_n>(0x0704, "pi_proportional_pct_n", "%/N", {0, 100}, 0.1F,
-                                        0.1F, kIdle, "Override for each N of force error."),
-      number<&M::pi_integral_pct_n_s>(0x0705, "pi_integral_pct_n_s", "%/(N s)", {0, 1000}, 0.7F,
-                                      0.7F, kIdle, "Override a second for each N of force error."),
-      number<&M::override_floor_pct>(0x0706, "override_floor_pct", "%", {0, 254}, 20, 20, kAnyTime,
-                                     "Lowest override that control may set."),
-      number<&M::override_ceiling_pct>(0x0707, "override_ceiling_pct", "%", {1, 254}, 200, 200,
-                                       kAnyTime, "Highest override that control may set."),
-      number<&M::override_initial_pct>(0x0708, "override_initial_pct", "%", {0, 254}, 100, 100,
-                                       kIdle,
-                                       "Override at the start and wherever control does not act."),
-      whole<&M::override_step_pct>(0x0709, "override_step_pct", {1, 10}, 1, 1, kConstruction,
-                                   "Step of the override that the CNC understands, 1 or 10 %."),
-      number<&M::slew_up_pct_s>(0x070a, "slew_up_pct_s", "%/s", {0.1F, 100000}, 240, 240, kIdle,
-                                "Fastest rise of the override."),
-      number<&M::slew_down_pct_s>(0x070b, "slew_down_pct_s", "%/s", {0.1F, 100000}, 1000, 1000,
-                                  kIdle, "Fastest fall of the override."),
-      number<&M::cut_threshold_n>(0x070c, "cut_threshold_n", "N", {0.1F, 100000}, 60, 60, kIdle,
-                                  "Force above which the tool is taken to be in the cut."),
-      choice<&M::override_code>(0x070d, "override_code", OverrideCode::kBinary,
-                                OverrideCode::kBinary, kConstruction,
-                                "How the CNC reads the override byte."),
-      number<&M::cut_drop_ratio>(
-          0x0760, "cut_drop_ratio", "", {0.01F, 1}, 0.1F, 0.1F, kIdle,
-          "A fall of the force by more than this part of it within one tick may be a broken tool: "
-          "the override does not rise then. 1 lets it, as the papers' laws do."),
-      number<&M::cut_lost_s>(0x0761, "cut_lost_s", "s", {0.001F, 10}, 0.5F, 0.5F, kIdle,
-                             "A force that is gone for so long is the end of the cut, before that "
-                             "perhaps a broken tool; at least one control period."),
   });
 }
 
 }  // namespace detail
 
-inline constexpr auto kParameters = detail::parameters();
+inline constexpr auto kParameters =
+    detail::joined(detail::machine_parameters(),
+                   detail::joined(detail::control_parameters(), detail::printed_parameters()));
 
 // Position in kParameters, or none.
 [[nodiscard]] constexpr std::optional<std::size_t> find_parameter(std::string_view key) noexcept {

@@ -1,3 +1,4 @@
+// The path around the paper's PI law; around all of them: law_set_test.cpp.
 #include "control/control_path.hpp"
 
 #include <gtest/gtest.h>
@@ -19,8 +20,9 @@ namespace cutforce::control {
 namespace {
 
 using host_tests::CuttingPlant;
+using PiPath = BasicControlPath<PiController>;
 
-constexpr ControlPath::Config kLathe{
+constexpr PiPath::Config kLathe{
     .force_reference_n = 500.0F,
     .approach_pct = 130.0F,
     .neutral_pct = 100.0F,
@@ -66,7 +68,7 @@ constexpr CuttingPlant::Config kProcess{.period_s = 0.05,
                                         .latency_ticks = 1,
                                         .override_pct = 100.0};
 
-constexpr ControlPath::Input at(double force_n) {
+constexpr PiPath::Input at(double force_n) {
   return {.force_n = static_cast<float>(force_n),
           .force_sigma_n = 5.0F,
           .force_age_ticks = 0,
@@ -78,19 +80,18 @@ constexpr ControlPath::Input at(double force_n) {
           .part_start = false};
 }
 
-ControlPath::Input lost(ControlPath::Input input) {
+PiPath::Input lost(PiPath::Input input) {
   input.force_valid = false;
   return input;
 }
 
 // The loop and the machine, one tick at a time.
 struct Machine {
-  ControlPath path;
+  PiPath path;
   CuttingPlant plant{kProcess};
-  ControlPath::Output output{};
+  PiPath::Output output{};
 
-  explicit Machine(const ControlPath::Config& config = kLathe)
-      : path(ControlPath::make(config).value()) {}
+  explicit Machine(const PiPath::Config& config = kLathe) : path(PiPath::make(config).value()) {}
 
   double tick(double depth_mm) {
     output = path.step(at(plant.force_n()));
@@ -195,10 +196,10 @@ TEST(ControlPath, RecoversFromALongSaturationWithoutWindUp) {
 
 // FAULTS row 19: the CNC locks the override at 60 % for 60 s and reports it.
 TEST(ControlPath, DoesNotWindUpWhileTheCncLocksTheOverride) {
-  auto path = ControlPath::make(kLathe).value();
+  auto path = PiPath::make(kLathe).value();
   CuttingPlant plant(kProcess);
   double peak_n = 0.0;
-  ControlPath::Output output{};
+  PiPath::Output output{};
   for (int i = 0; i < 1800; ++i) {
     const bool locked = i >= 300 && i < 1500;
     const double real_pct = locked ? 60.0 : output.override_pct;
@@ -219,7 +220,7 @@ TEST(ControlPath, DoesNotWindUpWhileTheCncLocksTheOverride) {
 
 // FAULTS row 17: the tool breaks at any moment of any cut; the force goes within a tick or with a
 // lag of up to 0.3 s. Nothing may speed up for 0.5 s.
-int rises_after_breakage(const ControlPath::Config& config) {
+int rises_after_breakage(const PiPath::Config& config) {
   std::mt19937 random(7);
   int rises = 0;
   for (int run = 0; run < 1000; ++run) {
@@ -270,7 +271,7 @@ TEST(ControlPath, HoldsThenFallsThenStaysWithoutAnEstimate) {
 }
 
 TEST(ControlPath, IsNotControllingBeforeTheFirstEstimateAndWhileDisabled) {
-  auto path = ControlPath::make(kLathe).value();
+  auto path = PiPath::make(kLathe).value();
   for (int i = 0; i < 10; ++i) {
     const auto output = path.step(lost(at(0.0)));
     EXPECT_FALSE(output.controlling);
@@ -292,7 +293,7 @@ TEST(ControlPath, TakesOverAndGivesBackWithoutAJump) {
   auto config = kLathe;
   config.feed_override.slew_up_pct_s = 40.0F;
   config.feed_override.slew_down_pct_s = 40.0F;
-  auto path = ControlPath::make(config).value();
+  auto path = PiPath::make(config).value();
   CuttingPlant plant(kProcess);
   int before = 100;
   for (int i = 0; i < 400; ++i) {
@@ -326,8 +327,8 @@ TEST(ControlPath, KeepsTheOverrideThroughTheGapsOfAnInterruptedCut) {
 
 TEST(ControlPath, RefusesEveryConfigThatBreaksARule) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-  using Config = ControlPath::Config;
-  using Error = ControlPath::ConfigError;
+  using Config = PiPath::Config;
+  using Error = PiPath::ConfigError;
   const struct {
     void (*spoil)(Config&);
     Error error;
@@ -357,7 +358,7 @@ TEST(ControlPath, RefusesEveryConfigThatBreaksARule) {
     Config config = kLathe;
     c.spoil(config);
     EXPECT_EQ(config.check().error(), c.error);
-    EXPECT_FALSE(ControlPath::make(config));
+    EXPECT_FALSE(PiPath::make(config));
   }
 }
 
@@ -365,7 +366,7 @@ TEST(ControlPath, RefusesEveryConfigThatBreaksARule) {
 // estimate of this very tick lets the override rise. Resumes bit for bit from a snapshot.
 TEST(ControlPath, NeverLeavesItsLimitsNorRisesBlindlyUnderRandomInput) {
   std::mt19937 random(8);
-  auto path = ControlPath::make(kLathe).value();
+  auto path = PiPath::make(kLathe).value();
   auto resumed = path;
   int before = 100;
   bool was_controlling = false;

@@ -215,7 +215,8 @@ TEST(Margins, AreWhatTheLoopReallyBears) {
                                     .form = control::PiController::Form::kVelocity,
                                     .proportional_pct_n = proportional_pct_n(random),
                                     .integral_pct_n_s = integral_pct_n_s(random),
-                                    .tracking_s = 0.05F});
+                                    .tracking_s = 0.05F,
+                                    .supervise = false});
     const auto plant = discretise(lags(4.0, {lag_s(random), lag_s(random)}), 0.05, 0.05);
     const auto found = margins(plant, law);
     EXPECT_EQ(found.stable, spectral_radius(closed_loop(plant, law)) < 1.0) << i;
@@ -253,7 +254,8 @@ TEST(Margins, GiveTheProcessGainAtWhichTheReproductionLoopIsLost) {
                                   .form = control::PiController::Form::kVelocity,
                                   .proportional_pct_n = 0.286F,
                                   .integral_pct_n_s = 1.38F,
-                                  .tracking_s = 0.05F});
+                                  .tracking_s = 0.05F,
+                                  .supervise = false});
   const auto found = margins(discretise(lags(4.0, {0.1}), 0.05, 0.05), law);
   EXPECT_NEAR(4.0 * found.gain_ratio, 7.43, 0.01);
 }

@@ -119,7 +119,8 @@ TEST(Pid, WithoutADerivativeIsTheVelocityFormOfThePiLaw) {
                                 .form = PiController::Form::kVelocity,
                                 .proportional_pct_n = 0.14F,
                                 .integral_pct_n_s = 0.8F,
-                                .tracking_s = 0.05F})
+                                .tracking_s = 0.05F,
+                                .supervise = false})
                 .value();
   std::mt19937 random(1);
   float applied_pct = 100.0F;

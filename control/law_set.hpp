@@ -1,0 +1,128 @@
+// Every law at once, and one of them in charge: which one is chosen at run time.
+//
+// Only the law in charge runs, so the others cost memory and no time. A law that is put in charge
+// joins at the first tick with a fresh force; until then the override stays where the path leaves
+// it. Joining, it starts as make() left it, is shown the tick `kCatchUpTicks` times in kTrack, as
+// if the cut had stood like this, and then takes part in the tick as the path wants. What
+// differences and filters remember has then become the present, and what learns the process has
+// seen it. So the override moves by the new law's own step from a cut at rest, and by nothing else
+// (law.hpp: following is bumpless).
+//
+// A law that keeps what it learned while another was in charge, a map of the part for one, has
+// `void rejoin() noexcept`: it is called instead of starting anew.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <expected>
+#include <type_traits>
+
+#include "control/fuzzy.hpp"
+#include "control/law.hpp"
+#include "control/mrac.hpp"
+#include "control/pi.hpp"
+#include "control/pid.hpp"
+#include "control/pole_assignment.hpp"
+#include "control/predictive.hpp"
+#include "control/variable_gain.hpp"
+
+namespace cutforce::control {
+
+enum class LawName : std::uint8_t {
+  kPi,
+  kPid,
+  kPoleAssignment,
+  kMrac,
+  kVariableGain,
+  kFuzzy,
+  kPredictive,
+};
+inline constexpr std::size_t kLawCount = 7;
+
+class LawSet {
+ public:
+  static constexpr int kCatchUpTicks = 8;
+
+  enum class ConfigError : std::uint8_t {
+    kInCharge,  // no law
+    kPeriods,   // the laws have different periods
+    kPi,
+    kPid,
+    kPoleAssignment,
+    kMrac,
+    kVariableGain,
+    kFuzzy,
+    kPredictive,
+  };
+
+  // Each law is checked, in charge or not: it may be, any time.
+  struct Config {
+    float period_s;
+    LawName in_charge;
+    PiController::Config pi;
+    Pid::Config pid;
+    PoleAssignment::Config pole_assignment;
+    Mrac::Config mrac;
+    VariableGain::Config variable_gain;
+    FuzzyPi::Config fuzzy;
+    Predictive::Config predictive;
+
+    [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
+  };
+
+  using Input = LawInput;
+  using Output = LawOutput;
+
+  struct State {
+    PiController::State pi;
+    Pid::State pid;
+    PoleAssignment::State pole_assignment;
+    Mrac::State mrac;
+    VariableGain::State variable_gain;
+    FuzzyPi::State fuzzy;
+    Predictive::State predictive;
+    std::uint32_t in_charge;  // of enum LawName
+    std::uint32_t joining;    // 1: put in charge, and no fresh force since
+  };
+
+  // Fails iff check() does.
+  [[nodiscard]] static std::expected<LawSet, ConfigError> make(const Config& config) noexcept;
+
+  [[nodiscard]] Output step(const Input& input) noexcept;
+
+  // Puts `name` in charge from the next step on. The law that is in charge already goes on.
+  void select(LawName name) noexcept;
+  [[nodiscard]] LawName in_charge() const noexcept { return in_charge_; }
+  [[nodiscard]] bool foresees() const noexcept;
+
+  [[nodiscard]] State state() const noexcept;
+  void restore(const State& state) noexcept;
+
+ private:
+  // config has passed check(): every law can be made.
+  explicit LawSet(const Config& config) noexcept;
+
+  void join(const Input& input) noexcept;
+  template <class Set, class Visitor>
+  static auto visit(Set& set, const Visitor& visitor);
+
+  Config config_;
+  PiController pi_;
+  Pid pid_;
+  PoleAssignment pole_assignment_;
+  Mrac mrac_;
+  VariableGain variable_gain_;
+  FuzzyPi fuzzy_;
+  Predictive predictive_;
+  LawName in_charge_;
+  bool joining_ = false;
+};
+
+static_assert(Law<LawSet>);
+static_assert(std::is_standard_layout_v<LawSet::State>);
+static_assert(sizeof(LawSet::State) == sizeof(PiController::State) + sizeof(Pid::State) +
+                                           sizeof(PoleAssignment::State) + sizeof(Mrac::State) +
+                                           sizeof(VariableGain::State) + sizeof(FuzzyPi::State) +
+                                           sizeof(Predictive::State) + 2 * 4);
+
+}  // namespace cutforce::control
