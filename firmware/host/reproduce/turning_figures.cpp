@@ -36,13 +36,15 @@ std::string held_text(const char* name, const Held& held) {
 
 Finding measured(const ClosedLoop& run, const char* figure) {
   const Held held(run);
-  return {"500 N are regulated on the measured force, also where the depth steps to 1.5 mm.",
-          held_text("Dynamometer", held),
-          true,
-          "",
-          {{sentence("%s: mean error at rest, %%", figure), held.worst_error_pct, 0.0, 3.0},
-           {sentence("%s: overshoot at the step, %%", figure), held.overshoot_pct, 15.0, 45.0},
-           {sentence("%s: settling after the step, s", figure), held.settling_s, 0.2, 1.5}}};
+  return {
+      "500 N are regulated on the measured force, also where the depth steps to 1.5 mm.",
+      held_text("Dynamometer", held),
+      true,
+      "The paper prints no gains; these are the largest at which the loop on the estimated force "
+      "settles too.",
+      {{sentence("%s: mean error at rest, %%", figure), held.worst_error_pct, 0.0, 3.0},
+       {sentence("%s: overshoot at the step, %%", figure), held.overshoot_pct, 15.0, 45.0},
+       {sentence("%s: settling after the step, s", figure), held.settling_s, 0.2, 1.5}}};
 }
 
 struct Names {
@@ -54,6 +56,28 @@ struct Names {
   const char* lagged;
 };
 
+// The paper's statement, judged by what it says: more overshoot and longer settling, both slightly.
+Finding nearly_as_good(const Names& names, const Held& dynamometer, const Held& synthesized,
+                       const Held& fast) {
+  const bool longer = synthesized.settling_s > dynamometer.settling_s;
+  return {
+      "On the estimated force the loop does nearly as well: slightly more overshoot, slightly "
+      "longer settling.",
+      held_text("Dynamometer", dynamometer) + " " + held_text("Synthesized", synthesized),
+      longer && synthesized.overshoot_pct > dynamometer.overshoot_pct,
+      (longer ? std::string()
+              : std::string("Slightly more overshoot, but no longer settling: the computed "
+                            "power, which the monitor turns to at the step, has less lag than "
+                            "the dynamometer's mean over the period. ")) +
+          held_text("The monitor summed up as a lag of 30 ms and 2 % of noise", fast),
+      {{sentence("%s: mean error at rest, %%", names.figure), synthesized.worst_error_pct, 0.0,
+        3.0},
+       {sentence("%s: overshoot beyond the dynamometer's, %%", names.figure),
+        synthesized.overshoot_pct - dynamometer.overshoot_pct, 0.0, 15.0},
+       {sentence("%s: settling over the dynamometer's", names.figure),
+        synthesized.settling_s / dynamometer.settling_s, 0.8, 2.5}}};
+}
+
 std::vector<Finding> estimated(const Runs& runs, const Names& names) {
   const Held dynamometer(runs.at(names.measured));
   const Held fast(runs.at(names.fast));
@@ -61,26 +85,17 @@ std::vector<Finding> estimated(const Runs& runs, const Names& names) {
   const Held fused(runs.at(names.fused));
   const Held lagged(runs.at(names.lagged));
   return {
-      {"On the estimated force the loop does nearly as well: slightly more overshoot, slightly "
-       "longer settling.",
-       held_text("Dynamometer", dynamometer) + " " + held_text("Synthesized", synthesized),
-       true,
-       held_text("Synthesized as a lag of 30 ms and 2 % of noise alone", fast),
-       {{sentence("%s: mean error at rest, %%", names.figure), synthesized.worst_error_pct, 0.0,
-         3.0},
-        {sentence("%s: overshoot beyond the dynamometer's, %%", names.figure),
-         synthesized.overshoot_pct - dynamometer.overshoot_pct, 0.0, 15.0},
-        {sentence("%s: settling beyond the dynamometer's, s", names.figure),
-         synthesized.settling_s - dynamometer.settling_s, 0.0, 1.5}}},
+      nearly_as_good(names, dynamometer, synthesized, fast),
       {"The power signal alone is too late to control by (about 0.3 s).",
        held_text("Measured power", lagged),
        true,
-       "0.1 s of dead time and 0.1 s of lag; the gains are those of the other runs.",
-       {{sentence("%s: overshoot on the measured power over the synthesized", names.figure),
-         lagged.overshoot_pct / synthesized.overshoot_pct, 1.1, 5.0},
-        {sentence("%s: settling on the measured power beyond the synthesized, s", names.figure),
-         std::isfinite(lagged.settling_s) ? lagged.settling_s - synthesized.settling_s : 10.0, 0.2,
-         10.0}}},
+       "0.1 s of dead time and 0.1 s of lag in the meter, with the gains of the other runs: the "
+       "force swings for seconds.",
+       {{sentence("%s: settling on the measured power over the synthesized", names.figure),
+         std::isfinite(lagged.settling_s) ? lagged.settling_s / synthesized.settling_s : 10.0, 2.5,
+         10.0},
+        {sentence("%s: deviation at rest on the measured power over the synthesized", names.figure),
+         lagged.deviation_pct / synthesized.deviation_pct, 1.5, 20.0}}},
       {"(Not in the paper.) The fused observer in place of the synthesized monitor.",
        held_text("Fused", fused),
        true,
@@ -94,14 +109,14 @@ std::vector<Finding> variable_measured(const Runs& runs) {
   return {measured(runs.at("p3_fig05"), "P3 Fig. 5")};
 }
 std::vector<Finding> variable_estimated(const Runs& runs) {
-  return estimated(runs, {"P3 Fig. 6", "p3_fig05", "p3_fig06", "p3_fig06_synthesized",
+  return estimated(runs, {"P3 Fig. 6", "p3_fig06_dynamometer", "p3_fig06", "p3_fig06_synthesized",
                           "p3_fig06_fused", "p3_fig06_measured"});
 }
 std::vector<Finding> fuzzy_measured(const Runs& runs) {
   return {measured(runs.at("p3_fig07"), "P3 Fig. 7")};
 }
 std::vector<Finding> fuzzy_estimated(const Runs& runs) {
-  return estimated(runs, {"P3 Fig. 8", "p3_fig07", "p3_fig08", "p3_fig08_synthesized",
+  return estimated(runs, {"P3 Fig. 8", "p3_fig08_dynamometer", "p3_fig08", "p3_fig08_synthesized",
                           "p3_fig08_fused", "p3_fig08_measured"});
 }
 
@@ -117,7 +132,7 @@ std::vector<PaperFigure> turning_figures() {
       {"p3_fig06",
        "P3 Fig. 6",
        "Variable gain on the estimated force",
-       {{"p3_fig05", "dynamometer"},
+       {{"p3_fig06_dynamometer", "dynamometer"},
         {"p3_fig06_measured", "measured power"},
         {"p3_fig06_synthesized", "synthesized"},
         {"p3_fig06_fused", "fused"},
@@ -131,7 +146,7 @@ std::vector<PaperFigure> turning_figures() {
       {"p3_fig08",
        "P3 Fig. 8",
        "Fuzzy law on the estimated force",
-       {{"p3_fig07", "dynamometer"},
+       {{"p3_fig08_dynamometer", "dynamometer"},
         {"p3_fig08_measured", "measured power"},
         {"p3_fig08_synthesized", "synthesized"},
         {"p3_fig08_fused", "fused"},
