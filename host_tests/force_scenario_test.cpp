@@ -184,7 +184,8 @@ TEST(ForceScenario, HasATemplateThatPassesItsOwnCheck) {
   ASSERT_TRUE(given && bare);
   EXPECT_EQ(given->machine, bare->machine);
   EXPECT_EQ(given->force.step_s, bare->force.step_s);
-  EXPECT_EQ(given->force.feed.feed_m_s, bare->force.feed.feed_m_s);
+  EXPECT_FLOAT_EQ(static_cast<float>(given->force.feed.feed_m_s),
+                  static_cast<float>(bare->force.feed.feed_m_s));
   EXPECT_EQ(given->force.process.exponent, bare->force.process.exponent);
   EXPECT_EQ(given->force.process.depth_m.points().size(),
             bare->force.process.depth_m.points().size());
@@ -193,10 +194,11 @@ TEST(ForceScenario, HasATemplateThatPassesItsOwnCheck) {
 TEST(ForceScenario, IsRefusedWithPlaceAndRemedyBeforeAnythingIsWritten) {
   const std::string head = "model = \"force\"\nduration_s = 3\n";
   const std::vector<std::pair<std::string, std::string>> table{
-      {head + "step = 0.001\n", ":3:1: unknown key step"},
-      {head + "sample_rate_hz = 1000\n", ":3:1: unknown key sample_rate_hz"},
-      {head + "[motor]\npole_pairs = 2\n", ":3:1"},
-      {head + "[sensors.speed]\nnoise_rad_s = 2\n", ":3:1"},
+      {head + "step = 0.001\n", ":3:1: step does not name its unit"},
+      {head + "sample_rate_hz = 1000\n", ":3:1: sample_rate_hz does not belong"},
+      {head + "[motor]\npole_pairs = 2\n", ":3:2: unknown section motor"},
+      {head + "[sensors.speed]\nnoise_rad_s = 2\n", ":3:2: unknown section sensors"},
+      {head + "[believed.signals]\nsample_rate_hz = 100\n", ":4:18: there is one force"},
       {head + "[process]\ndiameter_m = 0.05\n", ":4:1: unknown key diameter_m"},
       {head + "[process]\nlag_s = -0.1\n", ":4:9: lag_s = -0.1"},
       {head + "[sensor]\nlag_s = nan\n", ":4:9: lag_s is not a finite number"},

@@ -18,6 +18,7 @@ namespace {
 
 using firmware::host::Check;
 using firmware::host::Finding;
+using firmware::host::Outcome;
 using firmware::host::Reproduction;
 
 // Once for all tests: it runs everything.
@@ -95,7 +96,7 @@ TEST(Reproduction, SaysWhyWhereAStatementDoesNotComeOut) {
   std::size_t differing = 0;
   for (const Finding* finding : findings()) {
     EXPECT_FALSE(finding->said.empty() || finding->got.empty());
-    if (finding->agrees) continue;
+    if (finding->outcome != Outcome::kDiffers) continue;
     EXPECT_FALSE(finding->reason.empty()) << finding->said;
     ++differing;
   }

@@ -61,7 +61,7 @@ Finding fixed_gains() {
       sentence("Critical process gain %.4f N/(mm/min); at 2.2 N/(mm/min) a mm that is %.2f mm. "
                "With a feed lag of 20 ms %.2f.",
                gain, gain / 2.2, lagged),
-      true,
+      Outcome::kAgrees,
       "P1 prints neither K_m nor K_c; with 2.2 N/(mm/min) a mm its three statements on Fig. 8 "
       "all hold.",
       {near("P1: critical gain of the fixed-gain loop, N/(mm/min)", gain, 5.7143, 1e-3),
@@ -101,7 +101,7 @@ Finding assigned_poles() {
       sentence("Back through (8) to %.0e. The true gain may be %.3f (I), %.3f (II), %.3f (III) "
                "times the estimated one.",
                worst_round_trip(), first, second, third),
-      true,
+      Outcome::kAgrees,
       "A step from 2 to 3 mm is a ratio of 1.5: case II is unstable until the estimate has "
       "caught up. That is the quantitative cause of the oscillation in Fig. 10.",
       {{"P1: poles through (14) and (8), worst error", worst_round_trip(), 0.0, 1e-9},
@@ -120,7 +120,7 @@ Finding sampled_plant() {
   return {"(18) samples the identified plant (26).",
           sentence("alpha = %.6f, %.7f; beta = %.6f, %.6f.", at(plant.denominator, 1),
                    at(plant.denominator, 0), at(plant.numerator, 1), at(plant.numerator, 0)),
-          true,
+          Outcome::kAgrees,
           "With C = b/sqrt(a1^2 - 4 a0); the product that is printed is a slip.",
           {near("P2: alpha_1 of the sampled plant", at(plant.denominator, 1), -0.988701, 1e-6),
            near("P2: alpha_0", at(plant.denominator, 0), 0.0405995, 1e-6),
@@ -140,7 +140,7 @@ Finding state_model() {
       sentence("Plant [[%.4f, %.4f], [%.4f, %.4f]]; A_m(2,2) = %.4f.", number(plant.transition[0]),
                number(plant.transition[1]), number(plant.transition[2]),
                number(plant.transition[3]), number(model.transition[3])),
-      false,
+      Outcome::kDiffers,
       "(34) agrees with (26). (35) is 1/(s^2 + 15 s + 50), whose A_m(2,2) is 0.9909; with the "
       "printed 0.9999 the model would hold 70.6 N, not 60 N.",
       {near("P2: plant (34), A(1,1)", number(plant.transition[0]), 0.0267, 1e-4),
@@ -157,7 +157,7 @@ Finding lyapunov() {
           sentence("A_m^T P A_m - P = -I gives P = [[%.4f, %.4f], [%.4f, %.4f]].",
                    static_cast<double>(p.p11), static_cast<double>(p.p12),
                    static_cast<double>(p.p12), static_cast<double>(p.p22)),
-          false,
+          Outcome::kDiffers,
           "(33) is the equation of a continuous model. With a discrete A_m its solution is "
           "negative definite, and the law pushes the wrong way.",
           {near("P2: P(1,1) of the discrete equation", static_cast<double>(p.p11), 2.24978, 1e-3),
@@ -186,7 +186,7 @@ Finding printed_pid() {
       "T_s = 0.02 s.",
       sentence("Ultimate gain %.3f, period %.4f s. Largest pole %.1f at 20 ms, %.3f at 1 ms.",
                at.gain, at.period_s, slow, fast),
-      false,
+      Outcome::kDiffers,
       "(27) belongs to no sampling of (26) at 20 ms; it is what a simulation at 1 ms finds, "
       "with the period taken twice too long. At 20 ms the printed PID is unstable.",
       {near("P2: ultimate gain at 20 ms", at.gain, 4.999, 1e-3),

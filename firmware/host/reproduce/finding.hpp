@@ -1,6 +1,7 @@
 // What a paper says of a figure, what the run of it gives, and whether the two agree.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <string>
@@ -22,11 +23,17 @@ struct Check {
   [[nodiscard]] bool holds() const noexcept { return value >= least && value <= most; }
 };
 
+enum class Outcome : std::uint8_t {
+  kAgrees,
+  kDiffers,
+  kBeside,  // the paper says nothing of it
+};
+
 struct Finding {
-  std::string said;  // by the paper, in words
+  std::string said;  // by the paper, in words; beside it: what was tried
   std::string got;   // here, in numbers
-  bool agrees;
-  std::string reason;  // where they do not, why; or what else there is to know
+  Outcome outcome;
+  std::string reason;  // where they differ, why; or what else there is to know
   std::vector<Check> checks{};
 };
 
@@ -52,6 +59,14 @@ struct PaperFigure {
 
 // What needs no run: the papers' equations, evaluated.
 [[nodiscard]] std::vector<Finding> equation_findings();
+
+[[nodiscard]] constexpr std::string_view name_of(Outcome outcome) noexcept {
+  constexpr std::string_view kNames[] = {"agrees", "differs", "beside"};
+  return kNames[static_cast<std::size_t>(outcome)];
+}
+[[nodiscard]] constexpr Outcome agrees_if(bool holds) noexcept {
+  return holds ? Outcome::kAgrees : Outcome::kDiffers;
+}
 
 // Of each paper, for paper_figures().
 [[nodiscard]] std::vector<PaperFigure> pole_assignment_figures();  // P1

@@ -50,9 +50,12 @@ std::string wrapped(const std::string& indent, std::string text) {
 }
 
 std::string finding_text(const Finding& finding) {
-  std::string text = wrapped("  paper   ", finding.said) + wrapped("  here    ", finding.got);
+  const bool beside = finding.outcome == Outcome::kBeside;
+  std::string text = wrapped(beside ? "  beside  " : "  paper   ", finding.said) +
+                     wrapped("  here    ", finding.got);
   if (!finding.reason.empty()) {
-    text += wrapped(finding.agrees ? "  note    " : "  differs ", finding.reason);
+    const bool differs = finding.outcome == Outcome::kDiffers;
+    text += wrapped(differs ? "  differs " : "  note    ", finding.reason);
   }
   for (const Check& check : finding.checks) {
     if (check.holds()) continue;
@@ -73,7 +76,7 @@ Json finding_json(const Finding& finding) {
   }
   return {{"paper", finding.said},
           {"here", finding.got},
-          {"agrees", finding.agrees},
+          {"outcome", name_of(finding.outcome)},
           {"reason", finding.reason},
           {"checks", std::move(checks)}};
 }
@@ -93,8 +96,8 @@ struct Count {
 
 void add(Count& count, const std::vector<Finding>& findings) {
   for (const Finding& finding : findings) {
-    ++count.findings;
-    if (finding.agrees) ++count.agree;
+    if (finding.outcome != Outcome::kBeside) ++count.findings;
+    if (finding.outcome == Outcome::kAgrees) ++count.agree;
     count.checks += static_cast<int>(finding.checks.size());
     count.hold += static_cast<int>(std::ranges::count_if(finding.checks, &Check::holds));
   }

@@ -18,7 +18,7 @@ constexpr std::size_t kMostRows = 4000;  // of a curve
 
 std::string outcome_cell(const Finding& finding) {
   const bool fails = !std::ranges::all_of(finding.checks, &Check::holds);
-  const char* word = fails ? "fails" : finding.agrees ? "agrees" : "differs";
+  const std::string word(fails ? "fails" : name_of(finding.outcome));
   return "<td class=\"outcome " + std::string(word) + "\">" + word + "</td>";
 }
 
@@ -159,7 +159,9 @@ std::string reproduction_page(const Reproduction& reproduction) {
       {{"title", "The papers' figures, run again"},
        {"lead",
         "Every run is simulated: the laws as printed, then the same corrected where they do "
-        "not work. Where a statement does not come out, the table says why."},
+        "not work. Where a statement does not come out, the table says why; what no paper says is "
+        "marked beside. P3's Figs. 1 and 2 show the estimate itself: cutforce demo draws them, "
+        "cutforce evaluate measures them."},
        {"overview", overview_section(reproduction)},
        {"figures", sections},
        {"equations", equation_section(reproduction)},

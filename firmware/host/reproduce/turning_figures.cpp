@@ -39,7 +39,7 @@ Finding measured(const ClosedLoop& run, const char* figure) {
   return {
       "500 N are regulated on the measured force, also where the depth steps to 1.5 mm.",
       held_text("Dynamometer", held),
-      true,
+      Outcome::kAgrees,
       "The paper prints no gains; these are the largest at which the loop on the estimated force "
       "settles too.",
       {{sentence("%s: mean error at rest, %%", figure), held.worst_error_pct, 0.0, 3.0},
@@ -64,7 +64,7 @@ Finding nearly_as_good(const Names& names, const Held& dynamometer, const Held& 
       "On the estimated force the loop does nearly as well: slightly more overshoot, slightly "
       "longer settling.",
       held_text("Dynamometer", dynamometer) + " " + held_text("Synthesized", synthesized),
-      longer && synthesized.overshoot_pct > dynamometer.overshoot_pct,
+      agrees_if(longer && synthesized.overshoot_pct > dynamometer.overshoot_pct),
       (longer ? std::string()
               : std::string("Slightly more overshoot, but no longer settling: the computed "
                             "power, which the monitor turns to at the step, has less lag than "
@@ -88,7 +88,7 @@ std::vector<Finding> estimated(const Runs& runs, const Names& names) {
       nearly_as_good(names, dynamometer, synthesized, fast),
       {"The power signal alone is too late to control by (about 0.3 s).",
        held_text("Measured power", lagged),
-       true,
+       Outcome::kAgrees,
        "0.1 s of dead time and 0.1 s of lag in the meter, with the gains of the other runs: the "
        "force swings for seconds.",
        {{sentence("%s: settling on the measured power over the synthesized", names.figure),
@@ -96,9 +96,9 @@ std::vector<Finding> estimated(const Runs& runs, const Names& names) {
          10.0},
         {sentence("%s: deviation at rest on the measured power over the synthesized", names.figure),
          lagged.deviation_pct / synthesized.deviation_pct, 1.5, 20.0}}},
-      {"(Not in the paper.) The fused observer in place of the synthesized monitor.",
+      {"The fused observer in place of the synthesized monitor.",
        held_text("Fused", fused),
-       true,
+       Outcome::kBeside,
        "It has no switch, and less lag and noise.",
        {{sentence("%s: mean error at rest on the fused estimate, %%", names.figure),
          fused.worst_error_pct, 0.0, 3.0}}},

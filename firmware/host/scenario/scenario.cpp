@@ -165,9 +165,13 @@ void follow_control(TomlDocument& document, Scenario& scenario, MachineFile& bel
     estimator.refuse("estimator", "a machine without its motor has no signals for this estimator",
                      "leave it out, or choose dynamometer, or model = \"motor\"");
   }
-  if (estimator.has("estimate_period_s")) {
-    estimator.refuse("estimate_period_s", "there is one force a control period",
-                     "leave it out; control_period_s says how often");
+  TomlSection signals = section_at(document, "believed.signals");
+  for (auto* section : {&estimator, &signals}) {
+    for (const std::string_view key : {"estimate_period_s", "sample_rate_hz"}) {
+      if (!section->has(key)) continue;
+      section->refuse(key, "there is one force a control period",
+                      "leave it out; control_period_s says how often");
+    }
   }
   m.estimator = EstimatorName::kDynamometer;
   m.estimate_period_s = m.control_period_s;
