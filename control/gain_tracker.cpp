@@ -16,10 +16,14 @@ constexpr float kTrend_ratio_sqrt_s = 0.168F;  // more of it for each unit of tr
 constexpr float kTrendFloor = 0.1F;
 constexpr float kTrendMemory_s = 0.25F;
 constexpr float kTwiceThreshold_ratio = 0.81F;  // two readings in a row need this of the threshold
-constexpr float kJump_ratio = 1.0F;     // spread of a jump, of the gain
+constexpr float kJump_ratio = 1.0F;             // spread of a jump, of the gain
 constexpr float kEntry_variance = 2.0F;  // of the first gain, of the square of the remembered one
 constexpr float kSettled_ratio = 0.1F;   // spread of a gain that is remembered
-constexpr float kNothing = 0.01F;       // probability that an alarm means nothing
+constexpr float kModelSpread_ratio =
+    0.06F;  // of a gain that was learned from a jump: the lags are not exact
+constexpr float kBeginSpread_ratio = 0.2F;
+constexpr float kLeastFeed = 0.01F;
+constexpr float kNothing = 0.01F;  // probability that an alarm means nothing
 constexpr float kBadFit = 9.0F;
 constexpr float kBadFitEach = 4.0F;
 constexpr std::array<float, 3> kOnset{0.05F, 0.35F, 0.7F};  // parts of a tick
@@ -41,22 +45,33 @@ GainTracker::GainTracker(const Config& config) noexcept
                               config.sensor_lag_s);
   }
   state_.memory_n = config.gain_n;
-  settle_in(true);
+  settle_in_air();
 }
 
-// Into the air with the last gain remembered, or out of it with that gain.
-void GainTracker::settle_in(bool air) noexcept {
+// Out of the cut: the last gain is remembered.
+void GainTracker::settle_in_air() noexcept {
   State& s = state_;
-  s.air = air ? 1U : 0U;
-  s.gain_n = air ? 0.0F : s.memory_n;
+  s.air = 1;
+  s.gain_n = 0.0F;
   s.covariance = {};
   s.covariance[kSS] = square(config_.noise_n);
-  s.covariance[kKK] = air ? 0.0F : square(0.3F * s.gain_n);
   s.correlation = 0.0F;
   s.power = 1.0F;
 }
 
-void GainTracker::predict(float feed, float drift) noexcept {  // (C76), (C77)
+// The first reading of all: as if the force had been this for long.
+void GainTracker::begin(const Input& input) noexcept {
+  State& s = state_;
+  s.started = 1;
+  if (!(input.reading_n > input.entry_n && input.feed > kLeastFeed)) return;
+  s.air = 0;
+  s.force_n = s.sensed_n = input.reading_n;
+  s.gain_n = input.reading_n / input.feed;
+  s.covariance[kKK] = square(kBeginSpread_ratio * s.gain_n);
+  s.covariance[kFF] = square(kBeginSpread_ratio * s.force_n);
+}
+
+void GainTracker::predict(float feed, float feed_sigma, float drift) noexcept {  // (C76), (C77)
   State& s = state_;
   const float drive = s.gain_n * feed;
   s.sensed_n = lag_.sensed * s.sensed_n + lag_.sensed_force * s.force_n + lag_.sensed_input * drive;
@@ -79,6 +94,12 @@ void GainTracker::predict(float feed, float drift) noexcept {  // (C76), (C77)
   s.covariance[kSS] = sf * s_f + ss * s_s + sk * s_k;
   s.covariance[kSK] = s_k;
   s.covariance[kKK] = p[kKK] + square(drift * s.gain_n);
+  // An unknown moment moves force and reading together.
+  const float force_n = (1.0F - lag_.cut) * s.gain_n * feed_sigma;
+  const float sensed_n = lag_.sensed_input * s.gain_n * feed_sigma;
+  s.covariance[kFF] += force_n * force_n;
+  s.covariance[kFs] += force_n * sensed_n;
+  s.covariance[kSS] += sensed_n * sensed_n;
 }
 
 void GainTracker::correct(float innovation_n, float variance_n2) noexcept {  // (C78)
@@ -95,9 +116,13 @@ void GainTracker::correct(float innovation_n, float variance_n2) noexcept {  // 
 }
 
 // The base and each moment's response go one tick on, and the reading is weighed. (C79), (C80)
-void GainTracker::follow(float feed, float reading_n, float variance_n2,
+void GainTracker::follow(float feed, float feed_sigma, float reading_n, float noise_n2,
                          std::uint32_t tick) noexcept {
   State& s = state_;
+  // What an unknown moment did to the force is still there when the next readings come.
+  s.timing_n2 = square(lag_.cut) * s.timing_n2 +
+                square(lag_.sensed_input * std::max(s.gain_n, s.base.gain_n) * feed_sigma);
+  const float variance_n2 = noise_n2 + s.timing_n2;
   const float drive = s.base.gain_n * feed;
   s.base.sensed_n = lag_.sensed * s.base.sensed_n + lag_.sensed_force * s.base.force_n +
                     lag_.sensed_input * drive;
@@ -134,7 +159,8 @@ void GainTracker::conclude() noexcept {
     const float sharpness = prior + m.weight;
     jump_n[k] = (s.prior_mean_n * prior + m.fit) / sharpness;
     variance_n2[k] = 1.0F / sharpness;
-    const float misfit = square(s.prior_mean_n) * prior + s.residual - sharpness * square(jump_n[k]);
+    const float misfit =
+        square(s.prior_mean_n) * prior + s.residual - sharpness * square(jump_n[k]);
     cost[k] = misfit + estimator::log_positive(sharpness * s.prior_variance_n2) +
               2.0F * 1.8018F;  // ln 6, about: the other probability over the moments
     s.misfit = std::min(s.misfit, misfit);
@@ -163,7 +189,8 @@ void GainTracker::conclude() noexcept {
     std::size_t at = 0;
     for (std::size_t a = 0; a < 3; ++a) {
       for (std::size_t b = a; b < 3; ++b) {
-        s.covariance[at++] += share[k] * (apart[a] * apart[b] + variance_n2[k] * along[a] * along[b]);
+        s.covariance[at++] +=
+            share[k] * (apart[a] * apart[b] + variance_n2[k] * along[a] * along[b]);
       }
     }
   }
@@ -172,52 +199,62 @@ void GainTracker::conclude() noexcept {
   s.sensed_n = s.base.sensed_n + sensed_n;
 }
 
-void GainTracker::begin_jump(const Input& input, float variance_n2) noexcept {
+void GainTracker::begin_jump(const Input& input, float noise_n2) noexcept {
   State& s = state_;
   s.base = s.past;
   s.moments = {};
   s.residual = 0.0F;
   const bool from_air = !(s.base.gain_n > 0.05F * s.memory_n);
   s.prior_mean_n = from_air ? s.memory_n : 0.0F;
-  s.prior_variance_n2 = from_air ? kEntry_variance * square(s.memory_n)
-                                 : square(kJump_ratio * s.base.gain_n);
-  follow(s.past.feed, s.past.reading_n, variance_n2, 0);
-  follow(input.feed, input.reading_n, variance_n2, 1);
+  s.prior_variance_n2 =
+      from_air ? kEntry_variance * square(s.memory_n) : square(kJump_ratio * s.base.gain_n);
+  s.timing_n2 = 0.0F;
+  follow(s.past.feed, s.past.feed_sigma, s.past.reading_n, noise_n2, 0);
+  follow(input.feed, input.feed_sigma, input.reading_n, noise_n2, 1);
   s.samples = 2;
 }
 
+void GainTracker::restart() noexcept {
+  const float memory_n = state_.memory_n;
+  state_ = State{};
+  state_.memory_n = memory_n;
+  settle_in_air();
+}
+
 void GainTracker::coast(float feed) noexcept {
-  predict(feed, kDrift_ratio_sqrt_s * std::sqrt(config_.period_s));
+  predict(feed, 0.0F, kDrift_ratio_sqrt_s * std::sqrt(config_.period_s));
   state_.samples = 0;
   state_.ticks = 0;
 }
 
 auto GainTracker::step(const Input& input) noexcept -> Output {
   State& s = state_;
-  const bool air = input.air && s.samples == 0;
-  if (air != (s.air != 0) && s.samples == 0) settle_in(air);
+  if (s.started == 0) begin(input);
+  if (input.air && s.air == 0 && s.samples == 0) settle_in_air();
+  const bool air = s.air != 0;
   const Point before{.force_n = s.force_n,
                      .sensed_n = s.sensed_n,
                      .gain_n = s.gain_n,
                      .feed = input.feed,
+                     .feed_sigma = input.feed_sigma,
                      .reading_n = input.reading_n,
                      .variance_n2 = s.covariance[kKK]};
   const float trend = std::clamp(s.correlation / std::max(s.power, 0.5F), 0.0F, 1.0F);
-  const float drift = (kDrift_ratio_sqrt_s +
-                       kTrend_ratio_sqrt_s * std::max(trend - kTrendFloor, 0.0F)) *
-                      std::sqrt(config_.period_s);
-  const float noise_n2 = std::max(square(config_.noise_ratio * input.reading_n) +
-                                      square(config_.noise_n),
-                                  square(input.reading_sigma_n));
+  const float drift =
+      (kDrift_ratio_sqrt_s + kTrend_ratio_sqrt_s * std::max(trend - kTrendFloor, 0.0F)) *
+      std::sqrt(config_.period_s);
+  const float noise_n2 =
+      std::max(square(config_.noise_ratio * input.reading_n) + square(config_.noise_n),
+               square(input.reading_sigma_n));
   Output out{};
-  predict(input.feed, drift);
+  predict(input.feed, input.feed_sigma, drift);
   const float innovation_n = input.reading_n - s.sensed_n;
   const float variance_n2 = s.covariance[kSS] + noise_n2;
   out.innovation = innovation_n / std::sqrt(variance_n2);
 
   if (s.samples > 0) {
     ++s.samples;
-    follow(input.feed, input.reading_n, noise_n2, s.samples - 1);
+    follow(input.feed, input.feed_sigma, input.reading_n, noise_n2, s.samples - 1);
     conclude();
     if (s.misfit > kBadFit + kBadFitEach * static_cast<float>(s.samples)) {
       begin_jump(input, noise_n2);
@@ -226,14 +263,15 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
     }
   } else {
     const float size = magnitude(out.innovation);
-    const bool again = size > kTwiceThreshold_ratio * config_.jump_threshold &&
-                       out.innovation * s.last_innovation > 0.0F &&
-                       magnitude(s.last_innovation) >
-                           kTwiceThreshold_ratio * config_.jump_threshold;
-    const bool entry = air && innovation_n > input.entry_n;
-    if ((size > config_.jump_threshold || again || entry) && s.ticks >= 2 &&
-        (!air || innovation_n > 0.0F)) {
+    const bool again =
+        size > kTwiceThreshold_ratio * config_.jump_threshold &&
+        out.innovation * s.last_innovation > 0.0F &&
+        magnitude(s.last_innovation) > kTwiceThreshold_ratio * config_.jump_threshold;
+    const bool surprise = size > config_.jump_threshold || again;
+    const bool entry = air && (!input.air || innovation_n > input.entry_n);
+    if (s.ticks >= 1 && (air ? entry || (surprise && innovation_n > 0.0F) : surprise)) {
       s.rising = innovation_n > 0.0F ? 1U : 0U;
+      s.air = 0;
       begin_jump(input, noise_n2);
       conclude();
       out.jumped = true;
@@ -250,9 +288,12 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
   if (s.samples > 0) s.correlation = 0.0F;
   out.resolving = s.samples > 0;
   out.rising = s.rising != 0;
-  if (s.samples >= kSamples) s.samples = 0;
+  if (s.samples >= kSamples) {
+    s.samples = 0;
+    s.covariance[kKK] += square(kModelSpread_ratio * s.gain_n);
+  }
   s.past = before;
-  s.ticks = std::min(s.ticks + 1U, 2U);
+  s.ticks = 1;
   out.force_n = std::max(s.force_n, 0.0F);
   out.gain_n = s.gain_n;
   out.gain_sigma_n = std::sqrt(s.covariance[kKK]);

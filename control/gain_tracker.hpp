@@ -27,7 +27,7 @@ class GainTracker {
  public:
   enum class ConfigError : std::uint8_t { kPeriod, kLags, kGain, kNoise, kThreshold };
 
-  static constexpr std::size_t kMoments = 6;   // of a jump: 2 ticks of 3
+  static constexpr std::size_t kMoments = 6;    // of a jump: 2 ticks of 3
   static constexpr std::uint32_t kSamples = 5;  // readings that a jump is followed for
 
   struct Config {
@@ -57,6 +57,7 @@ class GainTracker {
     float reading_n;
     float reading_sigma_n;  // as the estimate states it; the config's noise is the least
     float feed;             // z: mean over the tick that ends now
+    float feed_sigma;       // of z, because nobody knows when exactly the CNC reads the override
     float entry_n;          // in the air a reading this far above the expected one is an entry
     bool air;
   };
@@ -65,11 +66,11 @@ class GainTracker {
     float force_n;
     float gain_n;
     float gain_sigma_n;
-    float trend;          // correlation of successive innovations, 0..1: the gain drifts
-    float innovation;     // in standard deviations
-    bool jumped;          // with this reading
-    bool resolving;       // a jump is being followed
-    bool rising;          // the jump is upwards
+    float trend;       // correlation of successive innovations, 0..1: the gain drifts
+    float innovation;  // in standard deviations
+    bool jumped;       // with this reading
+    bool resolving;    // a jump is being followed
+    bool rising;       // the jump is upwards
   };
 
   struct Moment {
@@ -84,6 +85,7 @@ class GainTracker {
     float sensed_n = 0.0F;
     float gain_n = 0.0F;
     float feed = 0.0F;  // of the tick after it
+    float feed_sigma = 0.0F;
     float reading_n = 0.0F;  // at the end of that tick
     float variance_n2 = 1.0F;
   };
@@ -101,12 +103,14 @@ class GainTracker {
     // The jump that is being followed.
     Point base{};  // open loop since the jump may have begun
     std::array<Moment, kMoments> moments{};
-    float residual = 0.0F;  // sum of r^2 / R if nothing happened
-    float misfit = 0.0F;    // the same of the moment that fits best
+    float residual = 0.0F;   // sum of r^2 / R if nothing happened
+    float misfit = 0.0F;     // the same of the moment that fits best
+    float timing_n2 = 0.0F;  // variance of the reading because the feed's moment is unknown
     float prior_mean_n = 0.0F;
     float prior_variance_n2 = 1.0F;
     std::uint32_t samples = 0;  // 0: no jump
-    std::uint32_t ticks = 0;    // since the start, saturating at 2
+    std::uint32_t ticks = 0;    // 1: past holds the tick before
+    std::uint32_t started = 0;
     std::uint32_t rising = 0;
     std::uint32_t air = 1;
   };
@@ -118,18 +122,23 @@ class GainTracker {
   // The feed goes on, the reading is not to be learned from.
   void coast(float feed) noexcept;
 
+  // Another part: only the last gain is remembered.
+  void restart() noexcept;
+
   [[nodiscard]] const State& state() const noexcept { return state_; }
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
   explicit GainTracker(const Config& config) noexcept;
 
-  void predict(float feed, float drift) noexcept;
+  void predict(float feed, float feed_sigma, float drift) noexcept;
   void correct(float innovation_n, float variance_n2) noexcept;
-  void begin_jump(const Input& input, float variance_n2) noexcept;
-  void follow(float feed, float reading_n, float variance_n2, std::uint32_t tick) noexcept;
+  void begin_jump(const Input& input, float noise_n2) noexcept;
+  void follow(float feed, float feed_sigma, float reading_n, float noise_n2,
+              std::uint32_t tick) noexcept;
   void conclude() noexcept;
-  void settle_in(bool air) noexcept;
+  void begin(const Input& input) noexcept;
+  void settle_in_air() noexcept;
 
   Config config_;
   LagStep lag_;

@@ -11,21 +11,31 @@ using estimator::power_positive;
 
 constexpr float kSpreadFree = 0.04F;  // spread of the gain that is not feared
 constexpr float kSpreadMost = 0.6F;
-constexpr float kLead = 0.5862F;      // of a gain that drifts upwards
+constexpr float kWary = 1.0F;     // times the caution while a jump upwards is learned
+constexpr float kLead = 0.5862F;  // of a gain that drifts upwards
 constexpr float kAfterJump_s = 0.35F;
 constexpr float kAfterJump_1_s = 4.835F;  // faster recovery while a jump is being learned
 constexpr float kDeepRetreat_s = 0.4F;    // after a jump
 constexpr float kAbove_ratio = 1.04F;
 constexpr float kFarAbove_ratio = 1.15F;
 constexpr float kMiddle_s = 0.2F;
-constexpr float kOver_ratio = 1.05F;      // static force of a command, over the reference
+constexpr float kOver_ratio = 1.05F;  // static force of a command, over the reference
 constexpr float kOverAfterJump_ratio = 1.15F;
-constexpr float kKeep_ratio = 0.03F;      // of the override: not worth a change at first
+constexpr float kKeep_ratio = 0.03F;  // of the override: not worth a change at first
 constexpr float kKeepFade_s = 1.5F;
-constexpr float kCoarse_ratio = 0.04F;    // of the override: coarser steps are rounded down
-constexpr float kEntry_ratio = 0.05F;     // of the reference: a reading above it ends the air
-constexpr float kLost_ratio = 0.2F;       // of the gain before: less is a lost cut
-constexpr float kLost_s = 0.5F;
+constexpr float kCoarse_ratio = 0.04F;  // of the override: coarser steps are rounded down
+constexpr float kEntry_ratio = 0.05F;   // of the reference: a reading above it ends the air
+constexpr float kTelling_ratio = 0.2F;  // of the reference: force that tells of the dead time
+constexpr float kLongestLatency_s = 0.4F;
+constexpr float kMostTicks = static_cast<float>(Predictive::kHistory - 2);
+constexpr float kMarginLeast = 1.6F;  // the loop must bear this much more than the highest gain
+constexpr float kConfidence = 2.0F;   // standard deviations up to it
+constexpr float kLost_ratio = 0.2F;   // of the gain before: less is a lost cut
+constexpr float kLost_s = 0.5F;       // after which a cut that is left is a light one
+
+LagStep lag_step(const Predictive::Config& config, float length_s) noexcept {
+  return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
+}
 
 }  // namespace
 
@@ -34,6 +44,7 @@ std::expected<void, Predictive::ConfigError> Predictive::Config::check() const n
   if (!(period_s > 0.0F && period_s <= 10.0F)) return fail(ConfigError::kPeriod);
   if (!(latency_s >= 0.0F && latency_s <= static_cast<float>(kHistory - 2) * period_s))
     return fail(ConfigError::kLatency);
+  if (!(latency_sigma_s >= 0.0F && latency_sigma_s <= 1.0F)) return fail(ConfigError::kLatency);
   if (!(feed_lag_s >= 0.0F && feed_lag_s <= 10.0F && process_lag_s > 0.0F &&
         process_lag_s <= 10.0F && sensor_lag_s >= 0.0F && sensor_lag_s <= 10.0F))
     return fail(ConfigError::kLags);
@@ -62,26 +73,36 @@ auto Predictive::make(const Config& config) noexcept -> std::expected<Predictive
                                           .noise_n = config.noise_n,
                                           .jump_threshold = config.jump_threshold});
   if (!tracker) return std::unexpected{ConfigError::kGain};
-  return Predictive{config, *tracker};
+  const auto map = PathMap::make({.period_s = config.period_s,
+                                  .feed_lag_s = config.feed_lag_s,
+                                  .sensor_lag_s = config.sensor_lag_s,
+                                  .feed_exponent = config.feed_exponent,
+                                  .gain_n = config.process_gain_n});
+  if (!map) return std::unexpected{ConfigError::kGain};
+  const auto bank = LatencyBank::make(
+      {.period_s = config.period_s,
+       .latency_s = config.latency_s,
+       .most_latency_s = std::min(kLongestLatency_s, kMostTicks * config.period_s),
+       .feed_lag_s = config.feed_lag_s,
+       .cut_lag_s = config.process_lag_s,
+       .sensor_lag_s = config.sensor_lag_s});
+  if (!bank) return std::unexpected{ConfigError::kLatency};
+  return Predictive{config, *tracker, *map, *bank};
 }
 
-Predictive::Predictive(const Config& config, const GainTracker& tracker) noexcept
+Predictive::Predictive(const Config& config, const GainTracker& tracker, const PathMap& map,
+                       const LatencyBank& bank) noexcept
     : config_(config),
       tracker_(tracker),
-      whole_ticks_(static_cast<std::uint32_t>(config.latency_s / config.period_s + 1e-4F)) {
-  const auto step = [&config](float length_s) {
-    return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
-  };
-  const float early_s =
-      std::max(config.latency_s - static_cast<float>(whole_ticks_) * config.period_s, 0.0F);
-  tick_ = step(config.period_s);
-  early_ = step(early_s);
-  late_ = step(config.period_s - early_s);
+      map_(map),
+      bank_(bank),
+      tick_(lag_step(config, config.period_s)) {
+  assume_latency(config.latency_s);
   const std::array<float, kReaches> lengths{config.period_s, 2.0F * config.period_s,
                                             std::max(kMiddle_s, 2.0F * config.period_s),
                                             config.calm_horizon_s};
   for (std::size_t k = 0; k < kReaches; ++k) {
-    const LagStep h = step(lengths[k]);
+    const LagStep h = lag_step(config, lengths[k]);
     const float apart_s = config.feed_lag_s - config.process_lag_s;
     horizons_[k] = {.length_s = lengths[k],
                     .force = h.cut,
@@ -91,32 +112,54 @@ Predictive::Predictive(const Config& config, const GainTracker& tracker) noexcep
   state_.feed.v = 1.0F;
 }
 
+void Predictive::assume_latency(float latency_s) noexcept {  // (C71)
+  whole_ticks_ = static_cast<std::uint32_t>(latency_s / config_.period_s + 1e-4F);
+  const float early_s =
+      std::max(latency_s - static_cast<float>(whole_ticks_) * config_.period_s, 0.0F);
+  dead_decay_ = exp_bounded(-latency_s / config_.process_lag_s);
+  early_ = lag_step(config_, early_s);
+  late_ = lag_step(config_, config_.period_s - early_s);
+}
+
+void Predictive::find_latency(const Input& input, bool jumped) noexcept {
+  const bool usable = input.phase == CutPhase::kCut && !jumped &&
+                      input.force_n > kTelling_ratio * input.force_reference_n;
+  const float before_s = bank_.state().latency_s;
+  const auto found =
+      bank_.step({.sent = state_.sent, .reading_n = input.force_n, .usable = usable});
+  if (found.latency_s != before_s) assume_latency(found.latency_s);
+}
+
 // What the override did to the feed since the last tick: mean of v. (C70)-(C73)
-float Predictive::known_feed(float applied_pct) noexcept {
+auto Predictive::known_feed(float applied_pct) noexcept -> KnownFeed {
   State& s = state_;
   const float now = applied_pct == s.sent_pct ? s.sent[0]
-                    : applied_pct > 0.0F      ? power_positive(0.01F * applied_pct,
-                                                               config_.feed_exponent)
-                                              : 0.0F;
+                    : applied_pct > 0.0F
+                        ? power_positive(0.01F * applied_pct, config_.feed_exponent)
+                        : 0.0F;
   for (std::size_t k = kHistory - 1; k > 0; --k) s.sent[k] = s.sent[k - 1];
   s.sent[0] = now;
   s.held_s = applied_pct == s.sent_pct ? s.held_s + config_.period_s : 0.0F;
   s.sent_pct = applied_pct;
   const float first = s.feed.advance(early_, config_.feed_lag_s, s.sent[whole_ticks_ + 1]);
   const float second = s.feed.advance(late_, config_.feed_lag_s, s.sent[whole_ticks_]);
-  return (early_.length_s * first + late_.length_s * second) / config_.period_s;
+  const float step = s.sent[whole_ticks_] - s.sent[whole_ticks_ + 1];
+  return {.mean = (early_.length_s * first + late_.length_s * second) / config_.period_s,
+          .sigma = estimator::magnitude(step) * config_.latency_sigma_s / config_.period_s};
 }
 
 // To the end of the dead time, with the codes that are on their way. (C86)
 auto Predictive::forecast(float force_n, float drive_n) const noexcept -> Forecast {
   FeedState feed = state_.feed;
+  float path_s = 0.0F;
   const auto go = [&](const LagStep& step, float w) {
     const float mean = feed.advance(step, config_.feed_lag_s, w);
+    path_s += step.length_s * feed_ratio(mean);
     force_n = step.cut * force_n + (1.0F - step.cut) * drive_n * mean;
   };
   if (early_.length_s > 0.0F) go(early_, state_.sent[whole_ticks_]);
   for (std::size_t k = whole_ticks_; k > 0; --k) go(tick_, state_.sent[k - 1]);
-  return {.force_n = force_n, .feed = feed.v, .drive_n = drive_n};
+  return {.force_n = force_n, .feed = feed.v, .path_s = path_s, .drive_n = drive_n};
 }
 
 // (C84), (C85)
@@ -135,10 +178,11 @@ float Predictive::pessimistic_gain_n(const GainTracker::Output& seen) noexcept {
   }
   s.last_gain_n = seen.gain_n;
   const float spread = std::min(seen.gain_sigma_n / seen.gain_n, kSpreadMost);
+  const float caution = config_.caution_ratio * (seen.resolving && seen.rising ? kWary : 1.0F);
   const float ahead_s = config_.latency_s + period_s + 0.5F * config_.process_lag_s;
-  const float lead = seen.trend > 0.1F ? std::clamp(kLead * s.trend_1_s * ahead_s, 0.0F, 0.3F) : 0.0F;
-  return seen.gain_n * (1.0F + config_.caution_ratio * std::max(spread - kSpreadFree, 0.0F)) *
-         (1.0F + lead);
+  const float lead =
+      seen.trend > 0.1F ? std::clamp(kLead * s.trend_1_s * ahead_s, 0.0F, 0.3F) : 0.0F;
+  return seen.gain_n * (1.0F + caution * std::max(spread - kSpreadFree, 0.0F)) * (1.0F + lead);
 }
 
 // (C87)
@@ -150,14 +194,31 @@ auto Predictive::reach(const Forecast& ahead, float reference_n) noexcept -> Rea
   return recent ? kTwoTicks : kCalm;
 }
 
+// How many times the gain that the law works with the true one may be. (C104)
+float Predictive::stable_gain_ratio(const Horizon& horizon) const noexcept {
+  const float decay = tick_.cut;
+  const float loop = horizon.force / (1.0F - horizon.force) * (1.0F - decay);
+  return 1.0F + (1.0F - estimator::magnitude(decay - loop)) / (loop * dead_decay_);
+}
+
+// A longer horizon while the gain may be too uncertain for a short one. (C105)
+auto Predictive::with_margin(Reach reach, const GainTracker::Output& seen) const noexcept -> Reach {
+  const float highest_n = seen.gain_n + kConfidence * seen.gain_sigma_n;
+  while (reach != kCalm &&
+         stable_gain_ratio(horizons_[reach]) * state_.feared_n < kMarginLeast * highest_n) {
+    reach = static_cast<Reach>(reach + 1);
+  }
+  return reach;
+}
+
 // The override that brings the force to the reference at the end of the horizon. (C88), (C89)
 float Predictive::wanted_pct(const Forecast& ahead, const Horizon& horizon,
                              float reference_n) const noexcept {
   if (!(ahead.drive_n > 1e-3F * reference_n)) return config_.ceiling_pct;
   const float own = 1.0F - horizon.force - horizon.feed;
-  const float w = (reference_n - horizon.force * ahead.force_n -
-                   ahead.drive_n * horizon.feed * ahead.feed) /
-                  (ahead.drive_n * own);
+  const float w =
+      (reference_n - horizon.force * ahead.force_n - ahead.drive_n * horizon.feed * ahead.feed) /
+      (ahead.drive_n * own);
   const float over = state_.since_jump_s < kLost_s ? kOverAfterJump_ratio : kOver_ratio;
   const float most = over * reference_n / ahead.drive_n;
   const float limited = std::min(w, most);
@@ -165,6 +226,20 @@ float Predictive::wanted_pct(const Forecast& ahead, const Horizon& horizon,
   if (limited > 1e4F) return config_.ceiling_pct;
   return std::clamp(100.0F * power_positive(limited, 1.0F / config_.feed_exponent),
                     config_.floor_pct, config_.ceiling_pct);
+}
+
+float Predictive::feed_ratio(float w) const noexcept {
+  return w > 1e-4F ? power_positive(w, 1.0F / config_.feed_exponent) : 0.0F;
+}
+
+void Predictive::learn(const GainTracker::Output& seen, float feed, CutPhase phase) noexcept {
+  const bool settled = state_.since_jump_s > kLost_s && phase == CutPhase::kCut;
+  map_.learn({.feed_ratio = feed_ratio(feed),
+              .gain_n = seen.gain_n,
+              .jumped = seen.jumped,
+              .rising = seen.rising,
+              .resolving = seen.resolving,
+              .steady = settled && seen.trend < 0.3F});
 }
 
 // A code that the CNC has, and not a new one for nothing. (C90)
@@ -196,25 +271,31 @@ bool Predictive::may_rise(const GainTracker::Output& seen, CutPhase phase) noexc
   if (s.before_jump_n > 0.0F) {
     const bool surely_cutting =
         seen.gain_n - 3.0F * seen.gain_sigma_n > kLost_ratio * s.before_jump_n;
-    if (surely_cutting) s.before_jump_n = 0.0F;
+    const bool light_cut = phase == CutPhase::kCut && s.since_jump_s > kLost_s;
+    if (surely_cutting || light_cut) s.before_jump_n = 0.0F;
   }
   return s.before_jump_n <= 0.0F && !(seen.jumped && seen.rising);
 }
 
 auto Predictive::step(const Input& input) noexcept -> Output {
   State& s = state_;
+  if (input.part_start) {
+    tracker_.restart();
+    map_.start();
+  }
   const float speed = input.spindle_ratio > 0.0F
                           ? power_positive(input.spindle_ratio, -config_.feed_exponent)
                           : 1.0F;
-  const float feed = known_feed(input.override_applied_pct) * speed;
+  const KnownFeed feed = known_feed(input.override_applied_pct);
   if (input.mode == LawMode::kHold) {
-    tracker_.coast(feed);
+    tracker_.coast(feed.mean * speed);
     return law_answer(input.override_applied_pct);
   }
   const float gain_before_n = tracker_.state().gain_n;
   const auto seen = tracker_.step({.reading_n = input.force_n,
                                    .reading_sigma_n = input.force_sigma_n,
-                                   .feed = feed,
+                                   .feed = feed.mean * speed,
+                                   .feed_sigma = feed.sigma * speed,
                                    .entry_n = kEntry_ratio * input.force_reference_n,
                                    .air = input.phase == CutPhase::kAir});
   s.since_jump_s = seen.jumped ? 0.0F : std::min(s.since_jump_s + config_.period_s, 100.0F);
@@ -222,20 +303,36 @@ auto Predictive::step(const Input& input) noexcept -> Output {
 
   const float gain_n = pessimistic_gain_n(seen);
   const bool rise = may_rise(seen, input.phase);
-  const float rate = s.since_jump_s < kAfterJump_s ? kAfterJump_1_s : config_.recovery_1_s;
+  s.recovering_s =
+      seen.jumped || !rise ? 0.0F : std::min(s.recovering_s + config_.period_s, 100.0F);
+  const float rate = s.recovering_s < kAfterJump_s ? kAfterJump_1_s : config_.recovery_1_s;
   const float kept = rise ? s.feared_n * exp_bounded(-rate * config_.period_s) : s.feared_n;
   s.feared_n = input.phase == CutPhase::kAir && !seen.resolving ? 0.0F : std::max(gain_n, kept);
 
   const Forecast ahead = forecast(seen.force_n, gain_n * speed);
   Forecast feared = ahead;
   feared.drive_n = s.feared_n * speed;
-  float wanted = wanted_pct(feared, horizons_[reach(ahead, input.force_reference_n)],
-                            input.force_reference_n);
+  if (config_.finds_latency) find_latency(input, seen.jumped);
+  if (config_.learns) learn(seen, feed.mean, input.phase);
+  const Horizon& horizon = horizons_[with_margin(reach(ahead, input.force_reference_n), seen)];
+  float wanted = wanted_pct(feared, horizon, input.force_reference_n);
   if (!rise) wanted = std::min(wanted, input.override_applied_pct);
-  Output out = law_answer(input.mode == LawMode::kActive
-                              ? as_code(wanted, input.override_applied_pct)
-                              : input.override_applied_pct);
+  if (config_.learns) {
+    wanted = std::max(map_.limit({.reference_n = input.force_reference_n,
+                                  .ahead_s = ahead.path_s,
+                                  .force_n = ahead.force_n,
+                                  .override_pct = wanted,
+                                  .spindle_ratio = input.spindle_ratio,
+                                  .air = input.phase == CutPhase::kAir}),
+                      config_.floor_pct);
+  }
+  Output out =
+      law_answer(input.mode == LawMode::kActive ? as_code(wanted, input.override_applied_pct)
+                                                : input.override_applied_pct);
   out.process_gain_n_pct = 0.01F * seen.gain_n;
+  if (seen.gain_n > 0.0F) {
+    out.stability_margin_ratio = stable_gain_ratio(horizon) * s.feared_n / seen.gain_n;
+  }
   out.process_gain_sigma_ratio = seen.gain_n > 0.0F ? seen.gain_sigma_n / seen.gain_n : 0.0F;
   return out;
 }
@@ -243,12 +340,17 @@ auto Predictive::step(const Input& input) noexcept -> Output {
 auto Predictive::state() const noexcept -> State {
   State s = state_;
   s.tracker = tracker_.state();
+  s.map = map_.state();
+  s.bank = bank_.state();
   return s;
 }
 
 void Predictive::restore(const State& state) noexcept {
   state_ = state;
   tracker_.restore(state.tracker);
+  map_.restore(state.map);
+  bank_.restore(state.bank);
+  assume_latency(state.bank.latency_s);
 }
 
 }  // namespace cutforce::control

@@ -18,7 +18,9 @@
 
 #include "control/force_model.hpp"
 #include "control/gain_tracker.hpp"
+#include "control/latency_bank.hpp"
 #include "control/law.hpp"
+#include "control/path_map.hpp"
 
 namespace cutforce::control {
 
@@ -43,21 +45,24 @@ class Predictive {
 
   struct Config {
     float period_s;
-    float latency_s;         // from a byte on the port to a feed reference that moves
-    float feed_lag_s;        // of the feed servo
-    float process_lag_s;     // of the cut, one to one and a half turns of the spindle
-    float sensor_lag_s;      // of the force estimate
-    float feed_exponent;     // of force over feed: 0.75..1
-    float process_gain_n;    // force at 100 %, before anything is known
-    float noise_ratio;       // of the estimate, of the force
-    float noise_n;           // of the estimate, beside it
-    float jump_threshold;    // in standard deviations; 4.2
-    float calm_horizon_s;    // settling time over 1.5; at least two periods
-    float recovery_1_s;      // rate at which a feared gain is forgotten
-    float caution_ratio;     // how much of the gain's spread is feared
+    float latency_s;        // from a byte on the port to a feed reference that moves
+    float latency_sigma_s;  // of that: a PLC's scan over sqrt(12)
+    float feed_lag_s;       // of the feed servo
+    float process_lag_s;    // of the cut, one to one and a half turns of the spindle
+    float sensor_lag_s;     // of the force estimate
+    float feed_exponent;    // of force over feed: 0.75..1
+    float process_gain_n;   // force at 100 %, before anything is known
+    float noise_ratio;      // of the estimate, of the force
+    float noise_n;          // of the estimate, beside it
+    float jump_threshold;   // in standard deviations; 4.2
+    float calm_horizon_s;   // settling time over 1.5; at least two periods
+    float recovery_1_s;     // rate at which a feared gain is forgotten
+    float caution_ratio;    // how much of the gain's spread is feared
     float floor_pct;
     float ceiling_pct;
     std::uint32_t step_pct;  // 1 or 10
+    bool learns;             // from one part to the next; needs the start of each
+    bool finds_latency;      // while cutting: a commissioning step
 
     [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
   };
@@ -67,14 +72,17 @@ class Predictive {
 
   struct State {
     GainTracker::State tracker{};
+    PathMap::State map{};
+    LatencyBank::State bank{};
     FeedState feed{};
     std::array<float, kHistory> sent{};  // (u/u0)^p, newest first
     float sent_pct = 100.0F;             // u of sent[0]
     float feared_n = 0.0F;               // pessimistic gain K_c
     float since_jump_s = 100.0F;
-    float before_jump_n = 0.0F;  // gain before a jump down, while the cut may be lost; else 0
-    float held_s = 0.0F;         // the present code has been sent for
-    float trend_1_s = 0.0F;      // relative slope of the gain
+    float recovering_s = 100.0F;  // since the override may rise again
+    float before_jump_n = 0.0F;   // gain before a jump down, while the cut may be lost; else 0
+    float held_s = 0.0F;          // the present code has been sent for
+    float trend_1_s = 0.0F;       // relative slope of the gain
     float last_gain_n = 0.0F;
   };
 
@@ -87,11 +95,13 @@ class Predictive {
   void restore(const State& state) noexcept;
 
  private:
-  Predictive(const Config& config, const GainTracker& tracker) noexcept;
+  Predictive(const Config& config, const GainTracker& tracker, const PathMap& map,
+             const LatencyBank& bank) noexcept;
 
   struct Forecast {
     float force_n;  // at the end of the dead time
     float feed;     // v there
+    float path_s;   // until then, in seconds at 100 %
     float drive_n;  // feared gain at the present spindle speed: force for a unit of feed
   };
   struct Horizon {  // of the force, (C88)
@@ -101,18 +111,31 @@ class Predictive {
   };
   enum Reach : std::size_t { kOneTick, kTwoTicks, kMiddle, kCalm, kReaches };
 
-  [[nodiscard]] float known_feed(float applied_pct) noexcept;
+  struct KnownFeed {
+    float mean;  // over the tick that ends
+    float sigma;
+  };
+  [[nodiscard]] KnownFeed known_feed(float applied_pct) noexcept;
   [[nodiscard]] Forecast forecast(float force_n, float drive_n) const noexcept;
   [[nodiscard]] float pessimistic_gain_n(const GainTracker::Output& seen) noexcept;
   [[nodiscard]] Reach reach(const Forecast& ahead, float reference_n) noexcept;
+  [[nodiscard]] float stable_gain_ratio(const Horizon& horizon) const noexcept;
+  [[nodiscard]] Reach with_margin(Reach reach, const GainTracker::Output& seen) const noexcept;
   [[nodiscard]] float wanted_pct(const Forecast& ahead, const Horizon& horizon,
                                  float reference_n) const noexcept;
+  void assume_latency(float latency_s) noexcept;
+  void find_latency(const Input& input, bool jumped) noexcept;
+  [[nodiscard]] float feed_ratio(float w) const noexcept;
+  void learn(const GainTracker::Output& seen, float feed, CutPhase phase) noexcept;
   [[nodiscard]] float as_code(float wanted_pct, float sent_pct) noexcept;
   [[nodiscard]] bool may_rise(const GainTracker::Output& seen, CutPhase phase) noexcept;
 
   Config config_;
   GainTracker tracker_;
-  std::uint32_t whole_ticks_;  // of the dead time
+  PathMap map_;
+  LatencyBank bank_;
+  std::uint32_t whole_ticks_;    // of the dead time
+  float dead_decay_;             // of the cut over the dead time
   LagStep tick_, early_, late_;  // early_: the part of a tick before a byte arrives
   std::array<Horizon, kReaches> horizons_;
   State state_{};

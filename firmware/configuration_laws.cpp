@@ -104,6 +104,7 @@ control::Predictive::Config predictive(const Machine& m, float period_s) noexcep
   constexpr auto kLongest = static_cast<float>(control::Predictive::kHistory - 2);
   return {.period_s = period_s,
           .latency_s = std::min(m.override_latency_s, 0.999F * kLongest * period_s),
+          .latency_sigma_s = m.override_latency_sigma_s,
           .feed_lag_s = apart_from(m.feed_lag_s, m.process_lag_s),
           .process_lag_s = m.process_lag_s,
           .sensor_lag_s = apart_from(m.force_lag_s, m.process_lag_s),
@@ -117,7 +118,9 @@ control::Predictive::Config predictive(const Machine& m, float period_s) noexcep
           .caution_ratio = m.predictive_caution_ratio,
           .floor_pct = m.override_floor_pct,
           .ceiling_pct = m.override_ceiling_pct,
-          .step_pct = m.override_step_pct > 5.0F ? 10U : 1U};
+          .step_pct = m.override_step_pct > 5.0F ? 10U : 1U,
+          .learns = m.predictive_learns,
+          .finds_latency = m.predictive_finds_latency};
 }
 
 }  // namespace

@@ -134,6 +134,7 @@ struct Machine {
   float process_gain_least_n_pct;
   float process_gain_most_n_pct;
   float override_latency_s;
+  float override_latency_sigma_s;
   float feed_lag_s;
   float process_lag_s;
   float force_lag_s;
@@ -161,6 +162,8 @@ struct Machine {
   float predictive_calm_horizon_s;
   float predictive_recovery_1_s;
   float predictive_caution_ratio;
+  bool predictive_learns;
+  bool predictive_finds_latency;
 
   // [control] as the papers print it
   float cut_drop_ratio;  // a fall of the force by more within a tick is steep; 1: never

@@ -54,6 +54,9 @@ namespace cutforce::firmware::detail {
       number<&M::override_latency_s>(
           0x0713, "override_latency_s", "s", {0, 1}, 0.05F, 0.05F, kConstruction,
           "Dead time from an override on the port to a feed that begins to change."),
+      number<&M::override_latency_sigma_s>(
+          0x0718, "override_latency_sigma_s", "s", {0, 0.5F}, 0.003F, 0.003F, kConstruction,
+          "Standard deviation of override_latency_s: the period of a scan over 3.5."),
       number<&M::feed_lag_s>(0x0714, "feed_lag_s", "s", {0.001F, 2}, 0.04F, 0.04F, kConstruction,
                              "Lag of the feed drive."),
       number<&M::process_lag_s>(0x0715, "process_lag_s", "s", {0.001F, 2}, 0.1F, 0.1F,
@@ -92,7 +95,7 @@ namespace cutforce::firmware::detail {
       number<&M::mrac_model_time_s>(0x0738, "mrac_model_time_s", "s", {0.01F, 10}, 0.3F, 0.3F,
                                     kIdle,
                                     "Time constant with which mrac wants the force to follow."),
-      number<&M::mrac_adaptation_hz>(0x0739, "mrac_adaptation_hz", "1/s", {0.001F, 1000}, 2, 2,
+      number<&M::mrac_adaptation_hz>(0x0739, "mrac_adaptation_hz", "1/s", {0.001F, 1000}, 4, 4,
                                      kIdle,
                                      "Rate at which mrac adapts; below 1 / control_period_s."),
       number<&M::variable_gain_open_loop_1_s>(
@@ -127,6 +130,12 @@ namespace cutforce::firmware::detail {
       number<&M::predictive_caution_ratio>(0x0755, "predictive_caution_ratio", "", {0, 3}, 0.3263F,
                                            0.3263F, kIdle,
                                            "How much of the spread of the gain predictive fears."),
+      flag<&M::predictive_learns>(
+          0x0756, "predictive_learns", true, true, kConstruction,
+          "Whether predictive learns from one part to the next; it needs the start of each."),
+      flag<&M::predictive_finds_latency>(
+          0x0757, "predictive_finds_latency", false, false, kConstruction,
+          "Whether predictive finds override_latency_s while it cuts."),
   });
 }
 

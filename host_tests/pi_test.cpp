@@ -216,6 +216,22 @@ TEST(PiController, TakesOverWithoutAJumpFromWhateverWasApplied) {
   }
 }
 
+// An integral that gives way slowly must not remember what it wanted before another decided.
+TEST(PiController, TakesOverWithoutAJumpInTheSlowestPositionForm) {
+  auto config = kZieglerNichols;
+  config.form = PiController::Form::kPosition;
+  config.tracking_s = 100.0F;
+  for (const LawMode mode : {LawMode::kTrack, LawMode::kHold}) {
+    auto law = PiController::make(config).value();
+    law.restore({.wanted_pct = 200.0F, .error_n = 0.0F});
+    auto input = active(500.0F, 50.0F);
+    input.mode = mode;
+    EXPECT_EQ(law.step(input).override_pct, 50.0F);
+    input.mode = LawMode::kActive;
+    EXPECT_NEAR(law.step(input).override_pct, 50.0F, 0.51F);
+  }
+}
+
 TEST(PiController, RemembersTheErrorThroughAHoldAndForgetsItWhileTracking) {
   auto law = PiController::make(kZieglerNichols).value();
   std::ignore = law.step(active(480.0F, 100.0F));

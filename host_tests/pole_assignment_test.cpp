@@ -220,6 +220,18 @@ TEST(PoleAssignment, RefusesEveryConfigThatBreaksARule) {
   }
 }
 
+// The highest gains that there are, and proportional and integral part of opposite signs.
+TEST(PoleAssignment, StaysFiniteBetweenTwoForcesNearTheLargestFloat) {
+  auto config = kCaseOne;
+  config.estimate.least_n_pct = config.estimate.initial_n_pct = 1e-4F;
+  auto law = PoleAssignment::make(config).value();
+  for (const float force_n : {3e38F, 1e38F, 0.0F, 2e38F}) {
+    auto input = cutting(force_n, 100.0F);
+    input.phase = CutPhase::kExit;  // nothing is learned
+    EXPECT_TRUE(std::isfinite(law.step(input).override_pct)) << force_n;
+  }
+}
+
 // Forces up to the largest float, any override, any order of modes and phases; poles of all kinds.
 TEST(PoleAssignment, StaysFiniteAndFollowsAndContinuesBitExactlyWithoutAllocating) {
   std::mt19937 random(10);

@@ -65,6 +65,13 @@ template <class Range>
 void merge_metadata(MachineFile& file, std::span<const RecordedValue> values,
                     std::string_view recording);
 
+// A value of the command line that overrules the machine file.
+struct MachineOption {
+  std::string option;  // "--estimator", for errors
+  std::string key;
+  std::string value;
+};
+
 // Overrules the file, as an option of the command line does. False: an error was added, at `where`.
 bool set_value(MachineFile& file, std::string_view key, std::string_view value, std::string where);
 

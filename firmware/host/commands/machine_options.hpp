@@ -4,15 +4,25 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "firmware/host/run/recorded_machine.hpp"
 
 namespace cutforce::firmware::host {
 
-struct MachineOptions {
-  std::string file;
+// What computes, for every command that runs the loop.
+struct BlockOptions {
   std::string estimator;
   std::string controller;
+
+  // `over` is what they win over, "the machine file".
+  void add_to(CLI::App& command, const std::string& over);
+  [[nodiscard]] std::vector<MachineOption> options() const;
+};
+
+struct MachineOptions {
+  std::string file;
+  BlockOptions blocks;
 
   void add_to(CLI::App& command);
   [[nodiscard]] MachineRequest request() const;

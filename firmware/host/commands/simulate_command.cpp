@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "firmware/host/commands/command.hpp"
+#include "firmware/host/commands/machine_options.hpp"
 #include "firmware/host/commands/progress.hpp"
 #include "firmware/host/run/simulate.hpp"
 
@@ -20,6 +21,7 @@ struct Options {
   std::string scenario;
   std::string out;
   std::string recording;
+  BlockOptions blocks;
   bool compare = false;
   std::string template_model;
   bool scenario_text = false;
@@ -68,7 +70,7 @@ Exit perform_simulate(Options options) {
     return refuse(
         InputError{"SCENARIO", "no scenario is named", "name a file, or ask for --template"});
   }
-  const auto scenario = read_scenario(options.scenario);
+  const auto scenario = read_scenario(options.scenario, options.blocks.options());
   if (!scenario) return refuse(scenario.error());
   if (options.compare && scenario->model == Model::kForce) {
     return refuse(InputError{"--compare",
@@ -87,7 +89,7 @@ Exit perform_demo(Options options) {
     std::cout << demo_scenario_text();
     return Exit::kDone;
   }
-  const auto scenario = parse_scenario(demo_scenario_text(), "demo");
+  const auto scenario = parse_scenario(demo_scenario_text(), "demo", options.blocks.options());
   if (!scenario) return refuse(scenario.error());
   options.compare = true;
   return run_scenario(*scenario, options);
@@ -103,6 +105,7 @@ void add_demo(CLI::App& program, Action& action) {
   command->add_option("--out", options->out, "Folder for the files of the run")
       ->type_name("DIR")
       ->capture_default_str();
+  options->blocks.add_to(*command, "the scenario");
   command->add_flag("--json", options->json, "Print the summary as JSON");
   command->add_flag("--scenario", options->scenario_text, "Print the demo's scenario instead");
   command->footer(
@@ -126,6 +129,7 @@ void add_simulate(CLI::App& program, Action& action) {
       ->add_option("--recording", options->recording,
                    "Write only the recording, to this file (.csv, .csv.gz, .cfr)")
       ->type_name("FILE");
+  options->blocks.add_to(*command, "the scenario");
   command->add_flag("--compare", options->compare, "Also P3's estimators, on the same samples");
   command->add_flag("--template{motor}", options->template_model,
                     "Print a commented scenario with every key instead; --template=force: of a "
@@ -134,6 +138,7 @@ void add_simulate(CLI::App& program, Action& action) {
   command->footer(R"(Examples:
   cutforce simulate --template > mine.toml
   cutforce simulate mine.toml --out out/mine --compare
+  cutforce simulate mine.toml --controller fuzzy --out out/fuzzy
   cutforce simulate --template=force > quick.toml
   cutforce simulate host_tests/scenarios/vhz.toml --recording vhz.csv.gz
 

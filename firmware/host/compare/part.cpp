@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "hal/host/simulation/arithmetic.hpp"
 #include "hal/host/simulation/random.hpp"
 
 namespace cutforce::firmware::host {
@@ -16,7 +17,6 @@ using hal::host::ProfilePoint;
 using hal::host::RandomStream;
 
 constexpr double kMm = 1e-3;
-constexpr double kSteadyOverridePct = 129.0;  // 500 N at 1 mm
 
 struct Stretch {
   double length_mm;
@@ -35,12 +35,19 @@ Profile stairs(const std::vector<Stretch>& stretches) {
   return Profile(std::move(points));
 }
 
+// Holds 500 N at this depth, as far as the ceiling lets it; also the approach through the air.
+double steady_override_pct(double depth_m) {
+  constexpr double kCeilingPct = 200.0;
+  const double relative_n = 500.0 / (2e9 * 0.2e-3 * std::max(depth_m, 1e-6));
+  return std::min(kCeilingPct, std::floor(100.0 * hal::host::power(relative_n, 1.0 / 0.864) + 0.5));
+}
+
 Part part_of(std::string name, std::string title, Profile depth_m) {
   Part part{.name = std::move(name), .title = std::move(title), .machine = comparison_lathe()};
   part.machine.feed.length_m = depth_m.points().back().at;
-  const bool in_cut = depth_m.points().front().value > 0.0;
-  part.machine.starts_in_cut = in_cut;
-  part.machine.feed.initial_override_pct = in_cut ? kSteadyOverridePct : 200.0;
+  const double first_m = depth_m.points().front().value;
+  part.machine.starts_in_cut = first_m > 0.0;
+  part.machine.feed.initial_override_pct = steady_override_pct(first_m);
   part.machine.process.depth_m = std::move(depth_m);
   return part;
 }

@@ -15,13 +15,6 @@
 
 namespace cutforce::firmware::host {
 
-// A value of the command line that overrules the machine file.
-struct MachineOption {
-  std::string option;  // "--estimator", for errors
-  std::string key;
-  std::string value;
-};
-
 struct MachineRequest {
   std::filesystem::path machine_file;  // empty: none
   std::vector<MachineOption> options;

@@ -161,9 +161,13 @@ void read_configs(TomlDocument& document, Scenario& scenario) {
 void follow_control(TomlDocument& document, Scenario& scenario, MachineFile& believed) {
   Machine& m = believed.machine;
   TomlSection estimator = document.section("estimator");
-  if (m.estimator != EstimatorName::kDynamometer && estimator.has("estimator")) {
-    estimator.refuse("estimator", "a machine without its motor has no signals for this estimator",
-                     "leave it out, or choose dynamometer, or model = \"motor\"");
+  if (m.estimator != EstimatorName::kDynamometer) {
+    // The document places what it holds; what it does not hold the command line gave.
+    const std::string where =
+        estimator.has("estimator") ? estimator.where("estimator") : "--estimator";
+    believed.errors.push_back({where,
+                               "a machine without its motor has no signals for this estimator",
+                               "leave it out, or choose dynamometer, or model = \"motor\""});
   }
   TomlSection signals = section_at(document, "believed.signals");
   for (auto* section : {&estimator, &signals}) {
@@ -187,7 +191,8 @@ std::expected<void, InputError> check(const Scenario& scenario) {
 }
 
 // What the firmware is given: the machine as it is, and what the file says of control and belief.
-MachineFile believed_machine(TomlDocument& document, Scenario& scenario, const std::string& name) {
+MachineFile believed_machine(TomlDocument& document, Scenario& scenario, const std::string& name,
+                             std::span<const MachineOption> options) {
   MachineFile believed{};
   believed.name = name;
   const auto controls = [](Section s) { return s >= Section::kEstimator; };
@@ -200,11 +205,15 @@ MachineFile believed_machine(TomlDocument& document, Scenario& scenario, const s
   }
   fill_sections(believed, document.root(), controls);
   fill_sections(believed, document.root().section("believed"), others);
+  for (const MachineOption& option : options) {
+    set_value(believed, option.key, option.value, option.option);
+  }
   if (force) follow_control(document, scenario, believed);
   return believed;
 }
 
-std::expected<Scenario, std::vector<InputError>> read(TomlDocument& document, std::string name) {
+std::expected<Scenario, std::vector<InputError>> read(TomlDocument& document, std::string name,
+                                                      std::span<const MachineOption> options) {
   Scenario scenario{};
   TomlSection root = document.root();
   scenario.title = root.text("title").value_or("Simulated run");
@@ -217,7 +226,7 @@ std::expected<Scenario, std::vector<InputError>> read(TomlDocument& document, st
   scenario.duration_s =
       required(root, "duration_s", {.minimum = 0.01F, .maximum = kLongestRunS, .unit = "s"});
   read_configs(document, scenario);
-  MachineFile believed = believed_machine(document, scenario, name);
+  MachineFile believed = believed_machine(document, scenario, name, options);
 
   std::vector<InputError> errors = document.finish();
   if (errors.empty()) {
@@ -235,17 +244,18 @@ std::expected<Scenario, std::vector<InputError>> read(TomlDocument& document, st
 
 }  // namespace
 
-std::expected<Scenario, std::vector<InputError>> read_scenario(const std::filesystem::path& path) {
+std::expected<Scenario, std::vector<InputError>> read_scenario(
+    const std::filesystem::path& path, std::span<const MachineOption> options) {
   auto document = TomlDocument::read(path);
   if (!document) return std::unexpected{std::vector{document.error()}};
-  return read(**document, path.string());
+  return read(**document, path.string(), options);
 }
 
-std::expected<Scenario, std::vector<InputError>> parse_scenario(std::string_view text,
-                                                                std::string name) {
+std::expected<Scenario, std::vector<InputError>> parse_scenario(
+    std::string_view text, std::string name, std::span<const MachineOption> options) {
   auto document = TomlDocument::parse(text, name);
   if (!document) return std::unexpected{std::vector{document.error()}};
-  return read(**document, std::move(name));
+  return read(**document, std::move(name), options);
 }
 
 bool is_scenario(const std::filesystem::path& path) {

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <expected>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -51,10 +52,11 @@ struct Scenario {
 // Likewise without a motor: the default machine with a dynamometer.
 [[nodiscard]] Machine machine_of(const hal::host::ForceMachineConfig& force);
 
+// The options win over the file.
 [[nodiscard]] std::expected<Scenario, std::vector<InputError>> read_scenario(
-    const std::filesystem::path& path);
-[[nodiscard]] std::expected<Scenario, std::vector<InputError>> parse_scenario(std::string_view text,
-                                                                              std::string name);
+    const std::filesystem::path& path, std::span<const MachineOption> options = {});
+[[nodiscard]] std::expected<Scenario, std::vector<InputError>> parse_scenario(
+    std::string_view text, std::string name, std::span<const MachineOption> options = {});
 
 // Whether a TOML file holds a scenario, not a machine: by the keys before and of its sections. No
 // scenario where it cannot be read.

@@ -78,10 +78,10 @@ class ForceMachine {
   [[nodiscard]] ProcessInput process_input() noexcept;
 
   ForceMachineConfig config_;
-  ProfileCursor speed_{};  // before what it is read for
   std::uint32_t steps_per_sample_;
   std::uint64_t steps_ = 0;
   double turns_ = 0.0;
+  ProfileCursor speed_{};  // before turns_s_, which starts with a look at it
   double turns_s_ = 0.0;
   FeedServo feed_;
   CuttingProcess process_;
