@@ -66,9 +66,9 @@ Finding nearly_as_good(const Names& names, const Held& dynamometer, const Held& 
       held_text("Dynamometer", dynamometer) + " " + held_text("Synthesized", synthesized),
       agrees_if(longer && synthesized.overshoot_pct > dynamometer.overshoot_pct),
       (longer ? std::string()
-              : std::string("Slightly more overshoot, but no longer settling: the computed "
-                            "power, which the monitor turns to at the step, has less lag than "
-                            "the dynamometer's mean over the period. ")) +
+              : sentence("The overshoot is slightly larger, but the settling is shorter, by "
+                         "%.2f s. ",
+                         dynamometer.settling_s - synthesized.settling_s)) +
           held_text("The monitor summed up as a lag of 30 ms and 2 % of noise", fast),
       {{sentence("%s: mean error at rest, %%", names.figure), synthesized.worst_error_pct, 0.0,
         3.0},
