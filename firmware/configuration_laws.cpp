@@ -11,6 +11,7 @@ using control::LawName;
 constexpr float kSettle_s = 2.0F;   // in the cut, until the process gain counts as settled
 constexpr float kSoft_pct = 10.0F;  // overrides below teach less
 constexpr float kDistinct_ratio = 0.02F;
+constexpr float kForceRate_hz = 10.0F;  // corner of the force's rate in P2's law
 
 LawName in_charge(ControllerName name) noexcept {
   switch (name) {
@@ -36,11 +37,13 @@ LawName in_charge(ControllerName name) noexcept {
 control::PoleAssignment::Config pole_assignment(const Machine& m, float period_s) noexcept {
   const float first = m.pole_assignment_pole_1_ratio;
   const float second = m.pole_assignment_pole_2_ratio;
+  const bool printed = m.pole_assignment_printed_rate_1_pct > 0.0F;
   return {.period_s = period_s,
           .pole_sum = first + second,
           .pole_product = first * second,
-          .estimate = {.form = control::ProcessGain::Form::kNormalised,
-                       .literal_rate_1_pct = 0.0F,
+          .estimate = {.form = printed ? control::ProcessGain::Form::kLiteral
+                                       : control::ProcessGain::Form::kNormalised,
+                       .literal_rate_1_pct = m.pole_assignment_printed_rate_1_pct,
                        .normalised_rate_ratio = m.pole_assignment_learning_ratio,
                        .soft_pct = kSoft_pct,
                        .initial_n_pct = m.process_gain_n_pct,
@@ -50,19 +53,25 @@ control::PoleAssignment::Config pole_assignment(const Machine& m, float period_s
           .settle_s = kSettle_s};
 }
 
-// The state-error form is the paper's; it is here so that both are sound, and is not chosen.
-control::Mrac::Config mrac(const Machine& m, float period_s) noexcept {
+// What fits any period, where the form is not chosen: both must be sound.
+control::StateErrorMrac::Config state_error(const Machine& m, float period_s) noexcept {
+  const bool chosen = m.mrac_form == MracForm::kStateError;
   return {.period_s = period_s,
-          .form = control::Mrac::Form::kOutputError,
-          .feed_mm_s_pct = 0.033333333F,
-          .derivative_hz = 0.5F / period_s,
-          .state_error = {.period_s = period_s,
-                          .model_pole_1_hz = 0.25F / period_s,
-                          .model_pole_2_hz = 0.5F / period_s,
-                          .plant_n_mm_s2 = 6037.7F,
-                          .state_scale_ratio = 6.6F,
-                          .adaptation_ratio = 18.0F,
-                          .normalised = true},
+          .model_pole_1_hz = chosen ? m.mrac_model_pole_1_hz : 0.25F / period_s,
+          .model_pole_2_hz = chosen ? m.mrac_model_pole_2_hz : 0.5F / period_s,
+          .plant_n_mm_s2 = m.mrac_plant_n_mm_s2,
+          .state_scale_ratio = m.mrac_state_scale_ratio,
+          .adaptation_ratio = m.mrac_state_gain_ratio,
+          .normalised = false};
+}
+
+control::Mrac::Config mrac(const Machine& m, float period_s) noexcept {
+  const bool on_state = m.mrac_form == MracForm::kStateError;
+  return {.period_s = period_s,
+          .form = on_state ? control::Mrac::Form::kStateError : control::Mrac::Form::kOutputError,
+          .feed_mm_s_pct = m.mrac_feed_mm_s_pct,
+          .derivative_hz = std::min(kForceRate_hz, 0.5F / period_s),
+          .state_error = state_error(m, period_s),
           .output_error = {.period_s = period_s,
                            .model_time_s = std::max(m.mrac_model_time_s, 0.2F * period_s),
                            .adaptation_hz = std::min(m.mrac_adaptation_hz, 0.99F / period_s),

@@ -30,6 +30,7 @@ enum class ControllerName : std::uint8_t {
   kFuzzy,
   kPredictive
 };
+enum class MracForm : std::uint8_t { kOutputError, kStateError };
 enum class PowerMode : std::uint8_t { kDotProduct, kTwoWattmeter, kFixedPowerFactor };
 enum class SpeedSource : std::uint8_t { kRotor, kSynchronous, kSlip };
 enum class SwitchMode : std::uint8_t { kAbsolute, kPositiveOnly };
@@ -163,6 +164,18 @@ struct Machine {
   float predictive_caution_ratio;
   bool predictive_learns;
   bool predictive_finds_latency;
+
+  // [control] as the papers print it
+  float cut_drop_ratio;  // a fall of the force by more within a tick is steep; 1: never
+  float cut_lost_s;      // a force that has gone for so long is the end of the cut
+  float pole_assignment_printed_rate_1_pct;  // g_c; 0: not used
+  MracForm mrac_form;
+  float mrac_model_pole_1_hz;
+  float mrac_model_pole_2_hz;
+  float mrac_plant_n_mm_s2;
+  float mrac_state_scale_ratio;
+  float mrac_state_gain_ratio;  // mu
+  float mrac_feed_mm_s_pct;
 
   friend constexpr bool operator==(const Machine&, const Machine&) noexcept = default;
 };

@@ -75,6 +75,15 @@ inline constexpr auto kControlRules = std::to_array<MachineRule>({
      },
      "the force cannot follow a model that is so much faster than the control period",
      "raise mrac_model_time_s to some control periods"},
+    {{"mrac_model_pole_2_hz", "mrac_model_pole_1_hz", "control_period_s", "mrac_form"},
+     [](const Machine& m) noexcept {
+       return m.mrac_form != MracForm::kStateError ||
+              (m.mrac_model_pole_1_hz * m.control_period_s >= 0.0011F &&
+               m.mrac_model_pole_2_hz >= 1.02F * m.mrac_model_pole_1_hz &&
+               m.mrac_model_pole_2_hz * m.control_period_s <= 9.9F);
+     },
+     "the model's poles are the same, out of order, or too slow or too fast for the period",
+     "give two different poles, the slower first, as 5 and 10"},
     {{"variable_gain_open_loop_1_s", "control_period_s", "override_latency_s", "controller"},
      [](const Machine& m) noexcept {
        return m.controller != ControllerName::kVariableGain || open_loop_share(m) < 0.98F;

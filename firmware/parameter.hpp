@@ -52,6 +52,7 @@ inline constexpr std::array<std::string_view, 5> kEstimator{"measured", "compute
                                                             "fused", "dynamometer"};
 inline constexpr std::array<std::string_view, 8> kController{
     "none", "pi", "pid", "pole_assignment", "mrac", "variable_gain", "fuzzy", "predictive"};
+inline constexpr std::array<std::string_view, 2> kMracForm{"output_error", "state_error"};
 inline constexpr std::array<std::string_view, 3> kPower{"dot_product", "two_wattmeter", "fixed_pf"};
 inline constexpr std::array<std::string_view, 3> kSpeed{"rotor", "synchronous", "slip"};
 inline constexpr std::array<std::string_view, 2> kSwitch{"absolute", "positive_only"};
@@ -67,6 +68,8 @@ template <>
 inline constexpr std::span<const std::string_view> kNames<EstimatorName>{detail::kEstimator};
 template <>
 inline constexpr std::span<const std::string_view> kNames<ControllerName>{detail::kController};
+template <>
+inline constexpr std::span<const std::string_view> kNames<MracForm>{detail::kMracForm};
 template <>
 inline constexpr std::span<const std::string_view> kNames<PowerMode>{detail::kPower};
 template <>

@@ -14,6 +14,7 @@
 
 #include "firmware/parameter_describe.hpp"
 #include "firmware/parameter_table_control.hpp"
+#include "firmware/parameter_table_printed.hpp"
 
 namespace cutforce::firmware {
 namespace detail {
@@ -210,7 +211,8 @@ namespace detail {
 }  // namespace detail
 
 inline constexpr auto kParameters =
-    detail::joined(detail::machine_parameters(), detail::control_parameters());
+    detail::joined(detail::machine_parameters(),
+                   detail::joined(detail::control_parameters(), detail::printed_parameters()));
 
 // Position in kParameters, or none.
 [[nodiscard]] constexpr std::optional<std::size_t> find_parameter(std::string_view key) noexcept {

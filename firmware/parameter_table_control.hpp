@@ -72,7 +72,7 @@ namespace cutforce::firmware::detail {
       flag<&M::pi_supervise>(
           0x0720, "pi_supervise", false, false, kConstruction,
           "Whether pi lowers its gains while the process that it sees would make them unstable."),
-      number<&M::pid_proportional_pct_n>(0x0728, "pid_proportional_pct_n", "%/N", {0.0001F, 100},
+      number<&M::pid_proportional_pct_n>(0x0728, "pid_proportional_pct_n", "%/N", {0.0001F, 1000},
                                          0.1F, 0.1F, kIdle,
                                          "Override for each N of force error, of pid."),
       number<&M::pid_integral_time_s>(

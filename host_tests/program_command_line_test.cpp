@@ -13,7 +13,7 @@ TEST(Program, HasHelpWithExamplesForEachCommand) {
   const auto all = cutforce("--help");
   EXPECT_EQ(all.exit_status, 0);
   for (const std::string command : {"demo", "simulate", "replay", "evaluate", "check", "report",
-                                    "lockstep", "convert", "tune"}) {
+                                    "lockstep", "reproduce", "compare", "tune", "convert"}) {
     SCOPED_TRACE(command);
     EXPECT_NE(all.output.find("\n  " + command + " "), std::string::npos) << all.output;
     const auto one = cutforce(command + " --help");
@@ -27,7 +27,7 @@ TEST(Program, RefusesACommandLineThatIsWrong) {
        {"", "replya", "--nothing", "replay", "replay x.csv", "replay --out x", "demo --out",
         "convert one", "report", "evaluate --condition nonsense", "evaluate --estimator nonsense",
         "replay x.csv --out y.csv --rate -5", "replay x.csv --out y.csv --rate many", "check",
-        "simulate", "lockstep", "demo --unknown"}) {
+        "simulate", "lockstep", "demo --unknown", "reproduce --figure p1_fig13"}) {
     const auto result = cutforce(line);
     EXPECT_EQ(result.exit_status, 2) << line << "\n" << result.output;
     EXPECT_NE(result.output.find("remedy: "), std::string::npos) << line << "\n" << result.output;
@@ -54,7 +54,8 @@ TEST(Program, WritesTemplatesThatPassItsOwnCheck) {
 
 TEST(Program, ChecksEveryScenarioOfTheTree) {
   std::size_t count = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(in_tests("scenarios"))) {
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(in_tests("scenarios"))) {
+    if (entry.is_directory()) continue;
     const auto result = cutforce("check " + q(entry.path()));
     EXPECT_EQ(result.exit_status, 0) << result.output;
     ++count;

@@ -31,6 +31,7 @@ void add_check(CLI::App& program, Action& action);
 void add_report(CLI::App& program, Action& action);
 void add_lockstep(CLI::App& program, Action& action);
 void add_evaluate(CLI::App& program, Action& action);
+void add_reproduce(CLI::App& program, Action& action);
 void add_convert(CLI::App& program, Action& action);
 void add_tune(CLI::App& program, Action& action);
 void add_compare(CLI::App& program, Action& action);

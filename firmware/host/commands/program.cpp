@@ -97,7 +97,7 @@ int run_program(int argc, const char* const* argv) {
   program.set_version_flag("--version", CUTFORCE_VERSION);
   Action action;
   for (const auto add : {add_demo, add_simulate, add_replay, add_evaluate, add_check, add_report,
-                         add_lockstep, add_convert, add_tune, add_compare}) {
+                         add_lockstep, add_reproduce, add_compare, add_tune, add_convert}) {
     add(program, action);
   }
   try {

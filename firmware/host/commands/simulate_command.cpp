@@ -23,7 +23,7 @@ struct Options {
   std::string recording;
   BlockOptions blocks;
   bool compare = false;
-  bool make_template = false;
+  std::string template_model;
   bool scenario_text = false;
   bool json = false;
 };
@@ -54,17 +54,30 @@ Exit run_scenario(const Scenario& scenario, const Options& options) {
   return result ? show(*result, options) : refuse(result.error());
 }
 
-Exit perform_simulate(Options options) {
-  if (options.make_template) {
-    std::cout << scenario_template(Preset::kLathe);
-    return Exit::kDone;
+Exit show_template(const std::string& model) {
+  if (model != "motor" && model != "force") {
+    return refuse(InputError{"--template", "there is no model " + model,
+                             "give --template for a machine with its motor, --template=force for "
+                             "one without"});
   }
+  std::cout << (model == "force" ? force_scenario_template() : scenario_template(Preset::kLathe));
+  return Exit::kDone;
+}
+
+Exit perform_simulate(Options options) {
+  if (!options.template_model.empty()) return show_template(options.template_model);
   if (options.scenario.empty()) {
     return refuse(
         InputError{"SCENARIO", "no scenario is named", "name a file, or ask for --template"});
   }
   const auto scenario = read_scenario(options.scenario, options.blocks.options());
   if (!scenario) return refuse(scenario.error());
+  if (options.compare && scenario->model == Model::kForce) {
+    return refuse(InputError{"--compare",
+                             "a machine without its motor has no signals to compare "
+                             "estimators on",
+                             "leave it out, or simulate a scenario with model = \"motor\""});
+  }
   if (options.out.empty()) {
     options.out = "out/" + std::filesystem::path(options.scenario).stem().string();
   }
@@ -118,13 +131,15 @@ void add_simulate(CLI::App& program, Action& action) {
       ->type_name("FILE");
   options->blocks.add_to(*command, "the scenario");
   command->add_flag("--compare", options->compare, "Also P3's estimators, on the same samples");
-  command->add_flag("--template", options->make_template,
-                    "Print a commented scenario with every key instead");
+  command->add_flag("--template{motor}", options->template_model,
+                    "Print a commented scenario with every key instead; --template=force: of a "
+                    "machine without its motor");
   command->add_flag("--json", options->json, "Print the summary as JSON");
   command->footer(R"(Examples:
   cutforce simulate --template > mine.toml
   cutforce simulate mine.toml --out out/mine --compare
   cutforce simulate mine.toml --controller fuzzy --out out/fuzzy
+  cutforce simulate --template=force > quick.toml
   cutforce simulate host_tests/scenarios/vhz.toml --recording vhz.csv.gz
 
 The same scenario gives the same files, bit for bit.)");

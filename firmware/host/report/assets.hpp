@@ -16,4 +16,7 @@ extern const std::string_view kTuningScript;   // tuning.js
 extern const std::string_view kComparePage;    // compare.html, with {{places}} to fill
 extern const std::string_view kCompareScript;  // compare.js
 
+extern const std::string_view kReproductionPage;    // reproduction.html, with {{places}} to fill
+extern const std::string_view kReproductionScript;  // reproduction.js
+
 }  // namespace cutforce::firmware::host::assets

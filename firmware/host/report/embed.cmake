@@ -4,9 +4,9 @@
 set(text "// made by embed.cmake\n#include \"firmware/host/report/assets.hpp\"\n\n"
          "namespace cutforce::firmware::host::assets {\nnamespace {\n")
 set(names kPage kStyle kScript kPlotScript kPlotStyle kPlotLicence kTuningPage kTuningScript
-          kComparePage kCompareScript)
+          kComparePage kCompareScript kReproductionPage kReproductionScript)
 set(files page.html page.css page.js uplot/uPlot.iife.min.js uplot/uPlot.min.css uplot/LICENSE
-          tuning.html tuning.js compare.html compare.js)
+          tuning.html tuning.js compare.html compare.js reproduction.html reproduction.js)
 set(views "")
 foreach(name file IN ZIP_LISTS names files)
   file(READ ${ROOT}/${file} hex HEX)

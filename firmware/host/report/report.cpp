@@ -1,19 +1,14 @@
 #include "firmware/host/report/report.hpp"
 
-#include <array>
-#include <bit>
-#include <cmath>
-#include <cstdint>
-#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <span>
 #include <system_error>
 
 #include "firmware/host/report/assets.hpp"
 #include "firmware/host/report/html.hpp"
+#include "firmware/host/report/page_data.hpp"
 #include "firmware/host/report/run_series.hpp"
 
 namespace cutforce::firmware::host {
@@ -21,38 +16,6 @@ namespace {
 
 using hal::host::InputError;
 using Json = nlohmann::ordered_json;
-
-static_assert(std::endian::native == std::endian::little, "the page reads little-endian numbers");
-
-template <class T>
-std::string base64(const std::vector<T>& values) {
-  constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  const auto bytes = std::as_bytes(std::span(values));
-  const auto at = [&](std::size_t k) {
-    return k < bytes.size() ? std::to_integer<std::uint32_t>(bytes[k]) : 0U;
-  };
-  std::string out;
-  out.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t k = 0; k < bytes.size(); k += 3) {
-    const std::uint32_t group = at(k) << 16 | at(k + 1) << 8 | at(k + 2);
-    for (unsigned n = 0; n < 4; ++n)
-      out += k + n > bytes.size() ? '=' : kDigits[group >> (18U - 6U * n) & 63U];
-  }
-  return out;
-}
-
-// An even grid is three numbers; any other is embedded.
-Json grid(const std::vector<double>& t) {
-  if (t.size() > 1) {
-    const double step = (t.back() - t.front()) / static_cast<double>(t.size() - 1);
-    bool even = true;
-    for (std::size_t k = 0; k < t.size() && even; ++k)
-      even = std::abs(t[k] - t.front() - step * static_cast<double>(k)) < 0.01 * step;
-    if (even) return {{"from_s", t.front()}, {"step_s", step}, {"count", t.size()}};
-  }
-  return {{"float64", base64(t)}, {"count", t.size()}};
-}
 
 Json number_or_null(const std::optional<double>& x) { return x ? Json(*x) : Json(nullptr); }
 

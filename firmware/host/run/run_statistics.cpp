@@ -125,7 +125,9 @@ std::vector<Figure> RunStatistics::figures(const Machine& machine) const {
   std::vector<Figure> figures{
       {"duration_s", "Duration", seconds(last_.time_ns - first_ns_), "s"},
       {"estimates", "Estimates", static_cast<double>(outputs_), ""},
-      {"with_torque_pct", "Time with a torque estimate", share_pct(torque_.count), "%"},
+      machine.estimator == EstimatorName::kDynamometer
+          ? Figure{"with_force_pct", "Time with a force", share_pct(force_sigma_.count), "%"}
+          : Figure{"with_torque_pct", "Time with a torque estimate", share_pct(torque_.count), "%"},
       {"in_cut_pct", "Time in the cut", share_pct(count(LoopState::kCut)), "%",
        std::to_string(cuts_) + (cuts_ == 1 ? " entry" : " entries")},
   };
@@ -179,7 +181,7 @@ std::string RunStatistics::verdict() const {
   }
   if (ends_refused()) {
     text = "Refused: the signals cannot carry an estimate. " + text;
-  } else if (torque_.count == 0) {
+  } else if (torque_.count == 0 && force_sigma_.count == 0) {
     text =
         "There was no estimate: the machine did not turn fast enough, or not long enough. " + text;
   }

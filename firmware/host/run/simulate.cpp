@@ -16,8 +16,11 @@ namespace {
 
 namespace fs = std::filesystem;
 using Errors = std::vector<InputError>;
+using hal::host::ForceMachine;
+using hal::host::ForceMachinePort;
 using hal::host::RecordingWriter;
 using hal::host::SimulatedMachine;
+using hal::host::SimulationPort;
 
 constexpr TraceRows kEveryEstimate{.control_ticks = false, .every_nth = 1};
 constexpr TraceRows kControlTicks{.control_ticks = true};
@@ -103,13 +106,12 @@ std::expected<fs::path, InputError> write_texts(const Scenario& scenario, const 
   return write_report(folder);
 }
 
-}  // namespace
+std::unexpected<Errors> failed(const InputError& error) { return std::unexpected{Errors{error}}; }
 
-std::expected<SimulationResult, Errors> simulate(const Scenario& scenario, const fs::path& folder,
-                                                 std::span<const EstimatorName> compare) {
-  const auto failed = [](const InputError& error) { return std::unexpected{Errors{error}}; };
-  auto machine = SimulatedMachine::make(scenario.simulation);
-  if (!machine) return failed(machine.error());
+template <class Simulated>
+std::expected<SimulationResult, Errors> simulate_on(Simulated& simulated, const Scenario& scenario,
+                                                    const fs::path& folder,
+                                                    std::span<const EstimatorName> compare) {
   auto loop = loop_for(scenario.machine, scenario.title);
   if (!loop) return failed(loop.error());
   auto made = OutputFolder::make(folder);
@@ -122,8 +124,8 @@ std::expected<SimulationResult, Errors> simulate(const Scenario& scenario, const
   if (!watchers) return failed(watchers.error());
 
   TruthScore score;
-  RecordedSimulation port(*machine, static_cast<double>(scenario.machine.control_period_s),
-                          scenario.duration_s, *writer, [&watchers](const hal::Sample& sample) {
+  RecordedSimulation port(simulated, scenario.duration_s, *writer,
+                          [&watchers](const hal::Sample& sample) {
                             for (Watcher& watcher : *watchers) {
                               if (const auto out = watcher.loop.step(sample)) {
                                 watcher.recorder.take(*out);
@@ -133,7 +135,7 @@ std::expected<SimulationResult, Errors> simulate(const Scenario& scenario, const
   hal::Sample block{};
   const auto ran = run(port, *loop, std::span(&block, 1), [&](const LoopOutput& output) {
     recorder->take(output);
-    score.add(output, machine->truth());
+    score.add(output, simulated.truth());
   });
   if (!ran && port.error()) return failed(*port.error());
 
@@ -153,25 +155,52 @@ std::expected<SimulationResult, Errors> simulate(const Scenario& scenario, const
   return result;
 }
 
-std::expected<void, Errors> simulate_recording(const Scenario& scenario,
-                                               const fs::path& recording) {
-  const auto failed = [](const InputError& error) { return std::unexpected{Errors{error}}; };
-  auto machine = SimulatedMachine::make(scenario.simulation);
-  if (!machine) return failed(machine.error());
+template <class Simulated>
+std::expected<void, Errors> record_on(Simulated& simulated, const Scenario& scenario,
+                                      const fs::path& recording) {
   auto loop = loop_for(scenario.machine, scenario.title);
   if (!loop) return failed(loop.error());
   auto made = OutputFolder::make(recording.parent_path());
   if (!made) return failed(made.error());
   auto writer = RecordingWriter::create(recording, layout_of(scenario));
   if (!writer) return failed(writer.error());
-  RecordedSimulation port(*machine, static_cast<double>(scenario.machine.control_period_s),
-                          scenario.duration_s, *writer, {});
+  RecordedSimulation port(simulated, scenario.duration_s, *writer, {});
   hal::Sample block{};
   const auto ran = run(port, *loop, std::span(&block, 1), [](const LoopOutput&) {});
   if (!ran && port.error()) return failed(*port.error());
   if (const auto finished = writer->finish(); !finished) return failed(finished.error());
   made->keep();
   return {};
+}
+
+// Makes the scenario's machine and hands its port to `work`, whose errors it returns with its own.
+template <class Work>
+auto on_machine_of(const Scenario& scenario, Work&& work)
+    -> decltype(work(std::declval<SimulationPort&>())) {
+  if (scenario.model == Model::kForce) {
+    auto machine = ForceMachine::make(scenario.force);
+    if (!machine) return failed(machine.error());
+    ForceMachinePort port(*machine, scenario.duration_s);
+    return work(port);
+  }
+  auto machine = SimulatedMachine::make(scenario.simulation);
+  if (!machine) return failed(machine.error());
+  SimulationPort port(*machine, static_cast<double>(scenario.machine.control_period_s),
+                      scenario.duration_s);
+  return work(port);
+}
+
+}  // namespace
+
+std::expected<SimulationResult, Errors> simulate(const Scenario& scenario, const fs::path& folder,
+                                                 std::span<const EstimatorName> compare) {
+  return on_machine_of(scenario,
+                       [&](auto& port) { return simulate_on(port, scenario, folder, compare); });
+}
+
+std::expected<void, Errors> simulate_recording(const Scenario& scenario,
+                                               const fs::path& recording) {
+  return on_machine_of(scenario, [&](auto& port) { return record_on(port, scenario, recording); });
 }
 
 }  // namespace cutforce::firmware::host

@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "firmware/host/number_text.hpp"
 #include "firmware/host/run/recorded_machine.hpp"
 
 namespace cutforce::firmware::host {
@@ -15,15 +16,6 @@ using hal::host::TruthSignal;
 constexpr std::uint32_t kTruths = bit(TruthSignal::kAirGapTorque) | bit(TruthSignal::kLoadTorque) |
                                   bit(TruthSignal::kCuttingTorque) |
                                   bit(TruthSignal::kCuttingForce);
-
-hal::host::Truth truth_of(const hal::host::MachineTruth& truth) {
-  return {.airgap_torque_nm = static_cast<float>(truth.airgap_torque_nm),
-          .load_torque_nm = static_cast<float>(truth.load_torque_nm),
-          .cutting_torque_nm = static_cast<float>(truth.cutting_torque_nm),
-          .cutting_force_n = static_cast<float>(truth.cutting_force_n),
-          .drive_airgap_torque_nm = 0.0F,
-          .present = kTruths};
-}
 
 std::string voltage_text(const hal::host::SimulatedMachineConfig& simulation) {
   const std::string inverter = simulation.inverter.switched ? "PWM inverter" : "averaged inverter";
@@ -39,9 +31,16 @@ std::string voltage_text(const hal::host::SimulatedMachineConfig& simulation) {
                                                              : ", raw samples");
 }
 
-}  // namespace
+std::vector<hal::host::Metadata> metadata_of(const Scenario& scenario, std::uint64_t seed,
+                                             std::vector<hal::host::Metadata> more) {
+  std::vector<hal::host::Metadata> metadata{{"source", "cutforce simulate, " + scenario.title, 0},
+                                            {"seed", std::to_string(seed), 0}};
+  for (auto& entry : more) metadata.push_back(std::move(entry));
+  for (auto& entry : machine_metadata(scenario.machine)) metadata.push_back(std::move(entry));
+  return metadata;
+}
 
-hal::host::RecordingLayout layout_of(const Scenario& scenario) {
+hal::host::RecordingLayout motor_layout(const Scenario& scenario) {
   const auto& simulation = scenario.simulation;
   const auto& sensors = simulation.sensors;
   std::uint32_t signals = 0;
@@ -57,42 +56,41 @@ hal::host::RecordingLayout layout_of(const Scenario& scenario) {
   add(sensors.diameter_present, Signal::kWorkpieceDiameter);
   add(sensors.feed_rate_present, Signal::kFeedRate);
   const bool vhz = simulation.drive.control == hal::host::DriveControl::kVoltsPerHertz;
-  std::vector<hal::host::Metadata> metadata{{"source", "cutforce simulate, " + scenario.title, 0},
-                                            {"seed", std::to_string(simulation.seed), 0},
-                                            {"drive", vhz ? "vhz" : "vector", 0},
-                                            {"voltage", voltage_text(simulation), 0}};
-  for (auto& entry : machine_metadata(scenario.machine)) metadata.push_back(std::move(entry));
-  return {.metadata = std::move(metadata),
+  return {.metadata = metadata_of(
+              scenario, simulation.seed,
+              {{"drive", vhz ? "vhz" : "vector", 0}, {"voltage", voltage_text(simulation), 0}}),
           .voltage_kind = sensors.voltage_kind,
           .signals = signals,
           .truths = kTruths};
 }
 
-RecordedSimulation::RecordedSimulation(hal::host::SimulatedMachine& machine,
-                                       double control_period_s, double duration_s,
-                                       hal::host::RecordingWriter& writer, Watcher watcher)
-    : machine_(machine),
-      port_(machine, control_period_s, duration_s),
-      writer_(writer),
-      watcher_(std::move(watcher)),
-      progress_("simulate", "s", duration_s) {}
-
-std::expected<std::size_t, hal::PortError> RecordedSimulation::read(std::span<hal::Sample> block) {
-  const auto count = port_.read(block.first(1));
-  if (!count || *count == 0) return count;
-  const hal::host::Truth truth = truth_of(machine_.truth());
-  if (auto written = writer_.write(block.first(1), std::span(&truth, 1)); !written) {
-    error_ = written.error();
-    return std::unexpected{hal::PortError::kSystem};
-  }
-  if (watcher_) watcher_(block.front());
-  ++samples_;
-  progress_.update(static_cast<double>(block.front().time_ns) * 1e-9);
-  return count;
+// A recording has columns for voltages and currents always; here they stay empty.
+hal::host::RecordingLayout force_layout(const Scenario& scenario) {
+  const auto& force = scenario.force;
+  std::uint32_t signals = hal::bit(Signal::kMeasuredForce);
+  if (force.speed_present) signals |= hal::bit(Signal::kSpeed);
+  if (force.override_applied_present) signals |= hal::bit(Signal::kOverrideApplied);
+  return {.metadata =
+              metadata_of(scenario, force.seed,
+                          {{"sample_rate_hz", number_text(scenario.machine.sample_rate_hz), 0}}),
+          .voltage_kind = hal::host::VoltageKind::kLineToNeutral,
+          .signals = signals,
+          .truths = bit(TruthSignal::kCuttingForce)};
 }
 
-std::expected<void, hal::PortError> RecordedSimulation::write(const hal::Command& command) {
-  return port_.write(command);
+}  // namespace
+
+hal::host::Truth recorded_truth(const hal::host::MachineTruth& truth) noexcept {
+  return {.airgap_torque_nm = static_cast<float>(truth.airgap_torque_nm),
+          .load_torque_nm = static_cast<float>(truth.load_torque_nm),
+          .cutting_torque_nm = static_cast<float>(truth.cutting_torque_nm),
+          .cutting_force_n = static_cast<float>(truth.cutting_force_n),
+          .drive_airgap_torque_nm = 0.0F,
+          .present = kTruths};
+}
+
+hal::host::RecordingLayout layout_of(const Scenario& scenario) {
+  return scenario.model == Model::kForce ? force_layout(scenario) : motor_layout(scenario);
 }
 
 }  // namespace cutforce::firmware::host

@@ -16,6 +16,7 @@ namespace {
 using hal::Signal;
 using hal::host::SignalFaultKind;
 
+constexpr std::array<std::string_view, 2> kModels{"motor", "force"};
 constexpr std::array<std::string_view, 3> kPresets{"lathe", "motor_a", "motor_b"};
 constexpr std::array<std::string_view, 6> kFaultKinds{"gap",     "stuck",    "lost",
                                                       "swapped", "inverted", "absent"};
@@ -34,7 +35,7 @@ double as_written(float value) {
 }
 
 struct Reader {
-  Simulation& simulation;
+  const ScenarioConfigs& configs;
   TomlSection& section;
   const ScenarioKey& key;
 
@@ -42,13 +43,13 @@ struct Reader {
     return {.minimum = key.minimum, .maximum = key.maximum, .unit = key.unit};
   }
   void operator()(NumberAt at) const {
-    if (const auto value = section.number(key.key, rule())) at(simulation) = as_written(*value);
+    if (const auto value = section.number(key.key, rule())) at(configs) = as_written(*value);
   }
   void operator()(FlagAt at) const {
-    if (const auto value = section.flag(key.key)) at(simulation) = *value;
+    if (const auto value = section.flag(key.key)) at(configs) = *value;
   }
   void operator()(const ChoiceAt& at) const {
-    if (const auto value = section.choice(key.key, at.names)) at.set(simulation, *value);
+    if (const auto value = section.choice(key.key, at.names)) at.set(configs, *value);
   }
   void operator()(ProfileAt at) const {
     const auto curve = section.curve(key.key, rule(), key.over);
@@ -57,13 +58,13 @@ struct Reader {
     for (const CurvePoint& point : *curve) {
       points.push_back({as_written(point.at), as_written(point.value)});
     }
-    at(simulation) = hal::host::Profile(std::move(points));
+    at(configs) = hal::host::Profile(std::move(points));
   }
   void operator()(const ChannelAt& at) const {
     const auto values = section.numbers(key.key, 3, rule());
     if (!values) return;
     for (std::size_t k = 0; k < 3; ++k) {
-      at.channels(simulation)[k].*at.value = as_written((*values)[k]);
+      at.channels(configs)[k].*at.value = as_written((*values)[k]);
     }
   }
 };
@@ -84,15 +85,18 @@ double required(TomlSection& section, std::string_view key, const NumberRule& ru
   return as_written(section.number(key, rule).value_or(rule.minimum));
 }
 
-void read_lists(TomlDocument& document, Simulation& simulation) {
-  const NumberRule time{.minimum = 0, .maximum = kLongestRunS, .unit = "s"};
+void read_hard_spots(TomlDocument& document, hal::host::ProcessConfig& process) {
   const NumberRule place{.minimum = 0, .maximum = 1e4F, .unit = "m"};
   for (TomlSection& spot : section_at(document, "process").sections("hard_spots")) {
-    simulation.process.hard_spots.push_back(
+    process.hard_spots.push_back(
         {.begin_m = required(spot, "begin_m", place),
          .end_m = required(spot, "end_m", place),
          .factor = required(spot, "factor", {.minimum = 0, .maximum = 100})});
   }
+}
+
+void read_motor_lists(TomlDocument& document, hal::host::SimulatedMachineConfig& simulation) {
+  const NumberRule time{.minimum = 0, .maximum = kLongestRunS, .unit = "s"};
   for (TomlSection& wave : section_at(document, "load").sections("oscillations")) {
     simulation.load.oscillations.push_back(
         {.begin_s = required(wave, "begin_s", time),
@@ -132,22 +136,80 @@ InputError placed(TomlDocument& document, const InputError& error) {
   return {section.where(key), error.where + " " + error.what, error.remedy};
 }
 
-void read_simulation(TomlDocument& document, Scenario& scenario) {
+void read_configs(TomlDocument& document, Scenario& scenario) {
+  const ScenarioConfigs configs(scenario);
   std::string_view open = "?";
   std::optional<TomlSection> section;
-  for (const ScenarioKey& key : scenario_keys()) {
+  for (const ScenarioKey& key : scenario_keys(scenario.model)) {
     if (key.section != open) section = section_at(document, key.section);
     open = key.section;
-    std::visit(Reader{scenario.simulation, *section, key}, key.at);
+    std::visit(Reader{configs, *section, key}, key.at);
   }
-  read_lists(document, scenario.simulation);
+  read_hard_spots(document, configs.process);
+  if (scenario.model == Model::kMotor) read_motor_lists(document, scenario.simulation);
   // A feed given in the other way takes the preset's place.
   TomlSection feed = document.section("feed");
-  if (feed.has("feed_m_s") && !feed.has("feed_m_rev")) scenario.simulation.feed.feed_m_rev = 0.0;
+  if (feed.has("feed_m_s") && !feed.has("feed_m_rev")) configs.feed.feed_m_rev = 0.0;
+  if (feed.has("feed_m_rev") && !feed.has("feed_m_s")) configs.feed.feed_m_s = 0.0;
   TomlSection machine = document.root();
   if (const auto seed = machine.whole("seed", 1, 2147483647)) {
-    scenario.simulation.seed = static_cast<std::uint64_t>(*seed);
+    scenario.simulation.seed = scenario.force.seed = static_cast<std::uint64_t>(*seed);
   }
+}
+
+// What control and simulation share is given once: the period, and the override at the start.
+void follow_control(TomlDocument& document, Scenario& scenario, MachineFile& believed) {
+  Machine& m = believed.machine;
+  TomlSection estimator = document.section("estimator");
+  if (m.estimator != EstimatorName::kDynamometer) {
+    // The document places what it holds; what it does not hold the command line gave.
+    const std::string where =
+        estimator.has("estimator") ? estimator.where("estimator") : "--estimator";
+    believed.errors.push_back({where,
+                               "a machine without its motor has no signals for this estimator",
+                               "leave it out, or choose dynamometer, or model = \"motor\""});
+  }
+  TomlSection signals = section_at(document, "believed.signals");
+  for (auto* section : {&estimator, &signals}) {
+    for (const std::string_view key : {"estimate_period_s", "sample_rate_hz"}) {
+      if (!section->has(key)) continue;
+      section->refuse(key, "there is one force a control period",
+                      "leave it out; control_period_s says how often");
+    }
+  }
+  m.estimator = EstimatorName::kDynamometer;
+  m.estimate_period_s = m.control_period_s;
+  m.sample_rate_hz = 1.0F / m.control_period_s;
+  scenario.force.sample_s = as_written(m.control_period_s);
+  if (!document.section("feed").has("initial_override_pct")) {
+    scenario.force.feed.initial_override_pct = as_written(m.override_initial_pct);
+  }
+}
+
+std::expected<void, InputError> check(const Scenario& scenario) {
+  return scenario.model == Model::kForce ? scenario.force.check() : scenario.simulation.check();
+}
+
+// What the firmware is given: the machine as it is, and what the file says of control and belief.
+MachineFile believed_machine(TomlDocument& document, Scenario& scenario, const std::string& name,
+                             std::span<const MachineOption> options) {
+  MachineFile believed{};
+  believed.name = name;
+  const auto controls = [](Section s) { return s >= Section::kEstimator; };
+  const auto others = [](Section s) { return s < Section::kEstimator; };
+  const bool force = scenario.model == Model::kForce;
+  believed.machine =
+      force ? machine_of(scenario.force) : machine_of(scenario.simulation, scenario.preset);
+  for (std::size_t k = 0; k < kParameters.size(); ++k) {
+    if (kParameters[k].section < Section::kEstimator) believed.where[k] = name;
+  }
+  fill_sections(believed, document.root(), controls);
+  fill_sections(believed, document.root().section("believed"), others);
+  for (const MachineOption& option : options) {
+    set_value(believed, option.key, option.value, option.option);
+  }
+  if (force) follow_control(document, scenario, believed);
+  return believed;
 }
 
 std::expected<Scenario, std::vector<InputError>> read(TomlDocument& document, std::string name,
@@ -155,29 +217,20 @@ std::expected<Scenario, std::vector<InputError>> read(TomlDocument& document, st
   Scenario scenario{};
   TomlSection root = document.root();
   scenario.title = root.text("title").value_or("Simulated run");
-  scenario.preset = static_cast<Preset>(root.choice("preset", kPresets).value_or(0));
+  scenario.model = static_cast<Model>(root.choice("model", kModels).value_or(0));
+  const bool force = scenario.model == Model::kForce;
+  const auto presets = std::span(kPresets).first(force ? 1 : kPresets.size());
+  scenario.preset = static_cast<Preset>(root.choice("preset", presets).value_or(0));
   scenario.simulation = simulation_of(scenario.preset);
+  scenario.force = force_lathe();
   scenario.duration_s =
       required(root, "duration_s", {.minimum = 0.01F, .maximum = kLongestRunS, .unit = "s"});
-  read_simulation(document, scenario);
-
-  MachineFile believed{};
-  believed.name = name;
-  const auto controls = [](Section s) { return s >= Section::kEstimator; };
-  const auto others = [](Section s) { return s < Section::kEstimator; };
-  believed.machine = machine_of(scenario.simulation, scenario.preset);
-  for (std::size_t k = 0; k < kParameters.size(); ++k) {
-    if (kParameters[k].section < Section::kEstimator) believed.where[k] = name;
-  }
-  fill_sections(believed, root, controls);
-  fill_sections(believed, root.section("believed"), others);
-  for (const MachineOption& option : options) {
-    set_value(believed, option.key, option.value, option.option);
-  }
+  read_configs(document, scenario);
+  MachineFile believed = believed_machine(document, scenario, name, options);
 
   std::vector<InputError> errors = document.finish();
   if (errors.empty()) {
-    if (const auto checked = scenario.simulation.check(); !checked) {
+    if (const auto checked = check(scenario); !checked) {
       errors.push_back(placed(document, checked.error()));
     }
   }
@@ -210,9 +263,10 @@ bool is_scenario(const std::filesystem::path& path) {
   if (!document) return false;
   TomlSection root = (*document)->root();
   // The others are sections of a machine file too.
-  constexpr std::array<std::string_view, 12> kOwn{
-      "title", "preset",  "duration_s", "seed", "sample_rate_hz", "inverter",
-      "drive", "process", "feed",       "load", "sensors",        "believed"};
+  constexpr std::array<std::string_view, 16> kOwn{
+      "title",    "model",    "preset", "duration_s",   "seed", "sample_rate_hz",
+      "inverter", "drive",    "feed",   "process",      "load", "sensors",
+      "sensor",   "believed", "step_s", "starts_in_cut"};
   return std::ranges::any_of(kOwn, [&](std::string_view key) { return root.has(key); });
 }
 

@@ -1,6 +1,7 @@
 // What a faultless commissioning would find of a simulated machine.
 #include <cmath>
 
+#include "firmware/host/compare/part.hpp"
 #include "firmware/host/scenario/scenario.hpp"
 #include "firmware/parameter_table.hpp"
 #include "hal/host/simulation/arithmetic.hpp"
@@ -100,6 +101,24 @@ Machine machine_of(const SimulatedMachineConfig& simulation, Preset preset) {
                            simulation_of(preset).motor.rated_torque_nm);
   m.rated_speed_rad_s = m.rated_power_w / m.rated_torque_nm;
   m.rated_frequency_hz = narrow(simulation.motor.rated_speed_rad_s / hal::host::kTwoPi);
+  return m;
+}
+
+hal::host::ForceMachineConfig force_lathe() {
+  hal::host::ForceMachineConfig force = comparison_lathe();
+  force.feed.length_m = 0.027;
+  force.process.depth_m = {{0.0, 0.0},      {0.003, 0.0},    {0.003, 0.001}, {0.015, 0.001},
+                           {0.015, 0.0015}, {0.027, 0.0015}, {0.027, 0.0}};
+  force.override_applied_present = true;
+  return force;
+}
+
+Machine machine_of(const hal::host::ForceMachineConfig& force) {
+  Machine m = default_machine();
+  m.estimator = EstimatorName::kDynamometer;
+  m.gear_ratio = narrow(force.gear_ratio);
+  m.speed_present = force.speed_present;
+  m.power_meter_present = false;
   return m;
 }
 

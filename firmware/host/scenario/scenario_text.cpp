@@ -12,15 +12,15 @@ namespace {
 std::string number(double value) { return number_text(static_cast<float>(value)); }
 
 struct Writer {
-  Simulation& simulation;
+  const ScenarioConfigs& configs;
 
-  std::string operator()(NumberAt at) const { return number(at(simulation)); }
-  std::string operator()(FlagAt at) const { return at(simulation) ? "true" : "false"; }
+  std::string operator()(NumberAt at) const { return number(at(configs)); }
+  std::string operator()(FlagAt at) const { return at(configs) ? "true" : "false"; }
   std::string operator()(const ChoiceAt& at) const {
-    return "\"" + std::string(at.names[at.get(simulation)]) + "\"";
+    return "\"" + std::string(at.names[at.get(configs)]) + "\"";
   }
   std::string operator()(ProfileAt at) const {
-    const auto& points = at(simulation).points();
+    const auto& points = at(configs).points();
     if (points.size() == 1) return number(points.front().value);
     std::string text;
     for (const auto& point : points) {
@@ -30,7 +30,7 @@ struct Writer {
   }
   std::string operator()(const ChannelAt& at) const {
     std::string text;
-    for (const auto& channel : at.channels(simulation)) {
+    for (const auto& channel : at.channels(configs)) {
       text += (text.empty() ? "[" : ", ") + number(channel.*at.value);
     }
     return text + "]";
@@ -59,15 +59,32 @@ constexpr std::string_view kHead =
 
 # Shown above the run.
 title = "Simulated run"
+)";
+
+constexpr std::string_view kMotorHead =
+    R"(# "motor": the machine with its motor, its drive and its signals; "force": see --template=force.
+model = "motor"
 # The machine to start from: "lathe" (5.5 kW), "motor_a" (2.2 kW), "motor_b" (7.5 kW).
 )";
 
-constexpr std::string_view kTail = R"(
-# Hard spots of the material, and a load that swings; any number of each.
+constexpr std::string_view kForceHead =
+    R"(# "force": feed, cut and a force sensor, one sample a control period; runs in a millisecond. The
+# estimator is the dynamometer.
+model = "force"
+# The machine to start from.
+preset = "lathe"
+)";
+
+constexpr std::string_view kHardSpots = R"(
+# Hard spots of the material; any number.
 # [[process.hard_spots]]
 # begin_m = 0.010
 # end_m = 0.011
 # factor = 1.3
+)";
+
+constexpr std::string_view kMotorTail = R"(
+# A load that swings; any number.
 # [[load.oscillations]]
 # begin_s = 2
 # end_s = 3
@@ -97,28 +114,63 @@ constexpr std::string_view kTail = R"(
 # stator_resistance_ohm = 0.9
 )";
 
-}  // namespace
+constexpr std::string_view kForceTail = R"(
+# The firmware: the sections [estimator] and [control] of a machine file (cutforce check --template).
+# [estimator]
+# control_period_s = 0.05
+# [control]
+# controller = "pi"
+# force_reference_n = 500
+)";
 
-std::string scenario_template(Preset preset) {
-  constexpr std::string_view kNames[] = {"lathe", "motor_a", "motor_b"};
-  Simulation simulation = simulation_of(preset);
-  std::string text(kHead);
-  text += "preset = \"" + std::string(kNames[static_cast<std::size_t>(preset)]) + "\"\n";
-  text += "# How long the run is; must be given. 0.01 to 36000 s\nduration_s = 11\n";
-  text += "# Of all that is random. The same seed gives the same run, bit for bit.\nseed = 1\n";
+constexpr std::string_view kRunKeys =
+    "# How long the run is; must be given. 0.01 to 36000 s\nduration_s = 11\n"
+    "# Of all that is random. The same seed gives the same run, bit for bit.\nseed = 1\n";
+
+std::string key_texts(Scenario& scenario) {
+  const ScenarioConfigs configs(scenario);
+  std::string text;
   std::string_view open;
-  for (const ScenarioKey& key : scenario_keys()) {
+  for (const ScenarioKey& key : scenario_keys(scenario.model)) {
     if (key.section != open) {
       open = key.section;
       text += "\n[" + std::string(open) + "]\n";
-      for (const ScenarioSection& section : scenario_sections()) {
+      for (const ScenarioSection& section : scenario_sections(scenario.model)) {
         if (section.name == open) text += "# " + std::string(section.sentence) + "\n";
       }
     }
     text += "# " + std::string(key.sentence) + " " + allowed(key) + "\n" + std::string(key.key) +
-            " = " + std::visit(Writer{simulation}, key.at) + "\n";
+            " = " + std::visit(Writer{configs}, key.at) + "\n";
   }
-  return text + std::string(kTail);
+  return text;
+}
+
+}  // namespace
+
+std::string scenario_template(Preset preset) {
+  constexpr std::string_view kNames[] = {"lathe", "motor_a", "motor_b"};
+  Scenario scenario{};
+  scenario.model = Model::kMotor;
+  scenario.simulation = simulation_of(preset);
+  std::string text(kHead);
+  text += kMotorHead;
+  text += "preset = \"" + std::string(kNames[static_cast<std::size_t>(preset)]) + "\"\n";
+  text += kRunKeys;
+  text += key_texts(scenario);
+  text += kHardSpots;
+  return text + std::string(kMotorTail);
+}
+
+std::string force_scenario_template() {
+  Scenario scenario{};
+  scenario.model = Model::kForce;
+  scenario.force = force_lathe();
+  std::string text(kHead);
+  text += kForceHead;
+  text += kRunKeys;
+  text += key_texts(scenario);
+  text += kHardSpots;
+  return text + std::string(kForceTail);
 }
 
 std::string_view demo_scenario_text() {

@@ -83,6 +83,10 @@ Sample ForceMachine::read() noexcept {
     sample.speed_rad_s = static_cast<float>(kTwoPi * turns_s_ * config_.gear_ratio);
     sample.present |= bit(Signal::kSpeed);
   }
+  if (config_.override_applied_present) {
+    sample.override_applied_pct = static_cast<float>(feed_.state().override_pct);
+    sample.present |= bit(Signal::kOverrideApplied);
+  }
   return sample;
 }
 

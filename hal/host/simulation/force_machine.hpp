@@ -29,8 +29,9 @@ struct ForceMachineConfig {
   double programmed_speed_1_s = 16.7;  // of the spindle, turns a second
   Profile speed_ratio{1.0};            // of that, over time
   double gear_ratio = 1.0;
-  bool starts_in_cut = false;  // force and sensor begin settled at the initial override
-  bool speed_present = false;  // whether the sample brings the motor's speed
+  bool starts_in_cut = false;             // force and sensor begin settled at the initial override
+  bool speed_present = false;             // whether the sample brings the motor's speed
+  bool override_applied_present = false;  // and the override in effect, as a CNC reports it
   FeedConfig feed{};
   ProcessConfig process{};
   ForceSensorConfig sensor{};
@@ -54,7 +55,7 @@ class ForceMachine {
   [[nodiscard]] static std::expected<ForceMachine, InputError> make(
       const ForceMachineConfig& config);
 
-  // The sample at the present time: measured_force_n, speed if configured.
+  // The sample at the present time: measured_force_n, speed and override if configured.
   [[nodiscard]] Sample read() noexcept;
   void set_override(double percent) noexcept { feed_.set_override(percent); }
 

@@ -23,6 +23,8 @@ class SimulationPort {
   [[nodiscard]] std::expected<void, PortError> write(const Command& command) noexcept;
 
   [[nodiscard]] const Command& last_command() const noexcept { return last_; }
+  // Of the last sample.
+  [[nodiscard]] MachineTruth truth() const noexcept { return machine_->truth(); }
 
  private:
   [[nodiscard]] std::int64_t period_of(std::int64_t time_ns) const noexcept;
