@@ -21,6 +21,12 @@ constexpr float kEntry_variance = 2.0F;  // of the first gain, of the square of 
 constexpr float kSettled_ratio = 0.1F;   // spread of a gain that is remembered
 constexpr float kModelSpread_ratio =
     0.06F;  // of a gain that was learned from a jump: the lags are not exact
+// The noise is matched to what is seen in a calm cut: a variance over the configured one.
+constexpr float kNoiseMemory_s = 10.0F;
+constexpr float kUsual = 3.0F;         // standard deviations; more is no noise
+constexpr float kUsualPower = 0.973F;  // of a normal variable that is cut off there
+constexpr float kQuietest = 0.1F;
+constexpr float kLoudest = 10.0F;
 constexpr float kBeginSpread_ratio = 0.2F;
 constexpr float kLeastFeed = 0.01F;
 constexpr float kNothing = 0.01F;  // probability that an alarm means nothing
@@ -216,8 +222,10 @@ void GainTracker::begin_jump(const Input& input, float noise_n2) noexcept {
 
 void GainTracker::restart() noexcept {
   const float memory_n = state_.memory_n;
+  const float noise_scale = state_.noise_scale;
   state_ = State{};
   state_.memory_n = memory_n;
+  state_.noise_scale = noise_scale;
   settle_in_air();
 }
 
@@ -244,8 +252,7 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
       (kDrift_ratio_sqrt_s + kTrend_ratio_sqrt_s * std::max(trend - kTrendFloor, 0.0F)) *
       std::sqrt(config_.period_s);
   const float noise_n2 =
-      std::max(square(config_.noise_ratio * input.reading_n) + square(config_.noise_n),
-               square(input.reading_sigma_n));
+      s.noise_scale * (square(config_.noise_ratio * input.reading_n) + square(config_.noise_n));
   Output out{};
   predict(input.feed, input.feed_sigma, drift);
   const float innovation_n = input.reading_n - s.sensed_n;
@@ -281,6 +288,11 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
       const float memory = config_.period_s / (kTrendMemory_s + config_.period_s);
       s.correlation += memory * (out.innovation * s.last_innovation - s.correlation);
       s.power += memory * (square(out.innovation) - s.power);
+      if (!air && size < kUsual && trend < kTrendFloor) {
+        const float slow = config_.period_s / (kNoiseMemory_s + config_.period_s);
+        s.noise_scale *= 1.0F + slow * (square(out.innovation) / kUsualPower - 1.0F);
+        s.noise_scale = std::clamp(s.noise_scale, kQuietest, kLoudest);
+      }
       if (!air && s.covariance[kKK] < square(kSettled_ratio * s.gain_n)) s.memory_n = s.gain_n;
     }
   }

@@ -55,10 +55,9 @@ class GainTracker {
 
   struct Input {
     float reading_n;
-    float reading_sigma_n;  // as the estimate states it; the config's noise is the least
-    float feed;             // z: mean over the tick that ends now
-    float feed_sigma;       // of z, because nobody knows when exactly the CNC reads the override
-    float entry_n;          // in the air a reading this far above the expected one is an entry
+    float feed;        // z: mean over the tick that ends now
+    float feed_sigma;  // of z, because nobody knows when exactly the CNC reads the override
+    float entry_n;     // in the air a reading this far above the expected one is an entry
     bool air;
   };
 
@@ -99,7 +98,8 @@ class GainTracker {
     float correlation = 0.0F;
     float power = 1.0F;
     float last_innovation = 0.0F;
-    Point past{};  // before the last reading
+    float noise_scale = 1.0F;  // variance of the readings over the configured one
+    Point past{};              // before the last reading
     // The jump that is being followed.
     Point base{};  // open loop since the jump may have begun
     std::array<Moment, kMoments> moments{};

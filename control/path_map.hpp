@@ -86,6 +86,11 @@ class PathMap {
 
   // A part begins: what the last one taught is kept.
   void start() noexcept;
+  // Nobody knows where the tool is: nothing is learned or limited until the next part begins.
+  void lose_place() noexcept {
+    state_.written = 0;
+    state_.started = 0;
+  }
   // Once a tick, before limit().
   void learn(const Lesson& lesson) noexcept;
   // The override that the map allows; the wanted one where it has nothing against it.

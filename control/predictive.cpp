@@ -293,7 +293,6 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   }
   const float gain_before_n = tracker_.state().gain_n;
   const auto seen = tracker_.step({.reading_n = input.force_n,
-                                   .reading_sigma_n = input.force_sigma_n,
                                    .feed = feed.mean * speed,
                                    .feed_sigma = feed.sigma * speed,
                                    .entry_n = kEntry_ratio * input.force_reference_n,
@@ -335,6 +334,14 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   }
   out.process_gain_sigma_ratio = seen.gain_n > 0.0F ? seen.gain_sigma_n / seen.gain_n : 0.0F;
   return out;
+}
+
+void Predictive::rejoin() noexcept {
+  tracker_.restart();
+  map_.lose_place();
+  state_ = State{};
+  state_.sent.fill(1.0F);
+  state_.feed.v = 1.0F;
 }
 
 auto Predictive::state() const noexcept -> State {

@@ -90,6 +90,9 @@ class Predictive {
   [[nodiscard]] static std::expected<Predictive, ConfigError> make(const Config& config) noexcept;
 
   [[nodiscard]] Output step(const Input& input) noexcept;
+  // In charge again after another law: what was learned of parts and of the dead time stays, but
+  // nothing of this part, whose path nobody followed.
+  void rejoin() noexcept;
 
   [[nodiscard]] State state() const noexcept;
   void restore(const State& state) noexcept;

@@ -100,6 +100,12 @@ float apart_from(float lag_s, float other_s) noexcept {
   return apart_s > 0.0F ? other_s + nearest_s : other_s - nearest_s;
 }
 
+// The controller sees the mean of the estimates within its period; a dynamometer's lag is its own.
+float seen_lag_s(const Machine& m, float period_s) noexcept {
+  if (m.estimator == EstimatorName::kDynamometer) return m.force_lag_s;
+  return m.force_lag_s + 0.5F * std::max(period_s - m.estimate_period_s, 0.0F);
+}
+
 control::Predictive::Config predictive(const Machine& m, float period_s) noexcept {
   constexpr auto kLongest = static_cast<float>(control::Predictive::kHistory - 2);
   return {.period_s = period_s,
@@ -107,7 +113,7 @@ control::Predictive::Config predictive(const Machine& m, float period_s) noexcep
           .latency_sigma_s = m.override_latency_sigma_s,
           .feed_lag_s = apart_from(m.feed_lag_s, m.process_lag_s),
           .process_lag_s = m.process_lag_s,
-          .sensor_lag_s = apart_from(m.force_lag_s, m.process_lag_s),
+          .sensor_lag_s = apart_from(seen_lag_s(m, period_s), m.process_lag_s),
           .feed_exponent = m.feed_exponent_ratio,
           .process_gain_n = 100.0F * m.process_gain_n_pct,
           .noise_ratio = m.predictive_noise_ratio,

@@ -11,8 +11,9 @@ namespace cutforce::firmware::detail {
   using enum Write;
   return std::to_array<Parameter>({
       // [control]
-      choice<&M::controller>(0x0701, "controller", ControllerName::kNone, ControllerName::kPi,
-                             kConstruction, "Which law sets the feed override."),
+      choice<&M::controller>(0x0701, "controller", ControllerName::kNone,
+                             ControllerName::kPredictive, kConstruction,
+                             "Which law sets the feed override."),
       number<&M::force_reference_n>(0x0702, "force_reference_n", "N", {1, 100000}, 500, 500,
                                     kAnyTime, "Cutting force to hold."),
       number<&M::force_limit_n>(0x0703, "force_limit_n", "N", {1, 200000}, 1000, 1000, kAnyTime,
@@ -52,12 +53,12 @@ namespace cutforce::firmware::detail {
                                           64, 64, kIdle,
                                           "Highest process gain that a law may learn."),
       number<&M::override_latency_s>(
-          0x0713, "override_latency_s", "s", {0, 1}, 0.05F, 0.05F, kConstruction,
+          0x0713, "override_latency_s", "s", {0, 1}, 0.05F, 0.035F, kConstruction,
           "Dead time from an override on the port to a feed that begins to change."),
       number<&M::override_latency_sigma_s>(
           0x0718, "override_latency_sigma_s", "s", {0, 0.5F}, 0.006F, 0.006F, kConstruction,
           "Standard deviation of override_latency_s: the period of a scan over 3.5."),
-      number<&M::feed_lag_s>(0x0714, "feed_lag_s", "s", {0.001F, 2}, 0.04F, 0.04F, kConstruction,
+      number<&M::feed_lag_s>(0x0714, "feed_lag_s", "s", {0.001F, 2}, 0.04F, 0.03F, kConstruction,
                              "Lag of the feed drive."),
       number<&M::process_lag_s>(0x0715, "process_lag_s", "s", {0.001F, 2}, 0.1F, 0.1F,
                                 kConstruction,

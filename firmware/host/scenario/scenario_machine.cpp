@@ -1,4 +1,5 @@
 // What a faultless commissioning would find of a simulated machine.
+#include <algorithm>
 #include <cmath>
 
 #include "firmware/host/compare/part.hpp"
@@ -11,6 +12,8 @@ namespace {
 
 using hal::host::Profile;
 using hal::host::SimulatedMachineConfig;
+
+constexpr float kLeastLag_s = 0.001F;  // that a machine file can say
 
 float narrow(double value) { return static_cast<float>(value); }
 
@@ -65,6 +68,17 @@ void set_signals(Machine& m, const SimulatedMachineConfig& s) {
   m.meter_lag_s = narrow(meter.lag_s + meter.dead_time_s);
 }
 
+// As a step test of the override would show it: half a scan belongs to the dead time.
+void set_feed_and_cut(Machine& m, const SimulatedMachineConfig& s) {
+  if (!(s.process.specific_force_n_m2 > 0.0)) return;
+  const double scan_s = s.feed.scan_s + s.feed.scan_jitter_s;
+  m.override_latency_s = narrow(s.feed.latency_s + 0.5 * scan_s);
+  m.override_latency_sigma_s = narrow(scan_s / std::sqrt(12.0));
+  m.feed_lag_s = std::max(narrow(s.feed.lag_s), kLeastLag_s);
+  m.process_lag_s = std::max(narrow(s.process.lag_s), kLeastLag_s);
+  m.feed_exponent_ratio = std::clamp(narrow(s.process.exponent), 0.3F, 1.5F);
+}
+
 // What the presets were made after.
 double rated_power_w(Preset preset) {
   switch (preset) {
@@ -97,6 +111,7 @@ Machine machine_of(const SimulatedMachineConfig& simulation, Preset preset) {
   set_motor(m, simulation);
   set_mechanics(m, simulation);
   set_signals(m, simulation);
+  set_feed_and_cut(m, simulation);
   m.rated_power_w = narrow(rated_power_w(preset) * simulation.motor.rated_torque_nm /
                            simulation_of(preset).motor.rated_torque_nm);
   m.rated_speed_rad_s = m.rated_power_w / m.rated_torque_nm;

@@ -105,7 +105,7 @@ constexpr std::string_view kMotorTail = R"(
 # [estimator]
 # estimator = "fused"
 # [control]
-# controller = "pi"
+# controller = "predictive"
 # force_reference_n = 500
 
 # The firmware is given the machine as it is. Where it is to be wrong, say so here: the other
@@ -119,7 +119,7 @@ constexpr std::string_view kForceTail = R"(
 # [estimator]
 # control_period_s = 0.05
 # [control]
-# controller = "pi"
+# controller = "predictive"
 # force_reference_n = 500
 )";
 
@@ -203,7 +203,7 @@ noise_rad_s = 0.02
 noise_w = 10
 
 [control]
-controller = "pi"
+controller = "predictive"
 force_reference_n = 500
 )";
 }
