@@ -32,7 +32,7 @@ namespace cutforce::firmware::detail {
                                        "Override at the start and wherever control does not act."),
       whole<&M::override_step_pct>(0x0709, "override_step_pct", {1, 10}, 1, 1, kConstruction,
                                    "Step of the override that the CNC understands, 1 or 10 %."),
-      number<&M::slew_up_pct_s>(0x070a, "slew_up_pct_s", "%/s", {0.1F, 100000}, 240, 240, kIdle,
+      number<&M::slew_up_pct_s>(0x070a, "slew_up_pct_s", "%/s", {0.1F, 100000}, 1000, 1000, kIdle,
                                 "Fastest rise of the override."),
       number<&M::slew_down_pct_s>(0x070b, "slew_down_pct_s", "%/s", {0.1F, 100000}, 1000, 1000,
                                   kIdle, "Fastest fall of the override."),
