@@ -25,11 +25,12 @@ constexpr float kModelSpread_ratio =
 constexpr float kNoiseMemory_s = 10.0F;
 constexpr float kUsual = 3.0F;         // standard deviations; more is no noise
 constexpr float kUsualPower = 0.973F;  // of a normal variable that is cut off there
-constexpr float kQuietest = 0.1F;
+constexpr float kQuietest = 0.5F;
 constexpr float kLoudest = 10.0F;
 constexpr float kBeginSpread_ratio = 0.2F;
 constexpr float kLeastFeed = 0.01F;
 constexpr float kNothing = 0.01F;  // probability that an alarm means nothing
+constexpr std::uint32_t kMostRestarts = 4;
 constexpr float kBadFit = 9.0F;
 constexpr float kBadFitEach = 4.0F;
 constexpr std::array<float, 3> kOnset{0.05F, 0.35F, 0.7F};  // parts of a tick
@@ -264,9 +265,15 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
     follow(input.feed, input.feed_sigma, input.reading_n, noise_n2, s.samples - 1);
     conclude();
     if (s.misfit > kBadFit + kBadFitEach * static_cast<float>(s.samples)) {
-      begin_jump(input, noise_n2);
-      conclude();
-      out.jumped = true;
+      // No moment explains it: look again from here, and in the end give up the model's past.
+      if (++s.restarts > kMostRestarts) {
+        s.samples = 0;
+        begin(input);
+      } else {
+        begin_jump(input, noise_n2);
+        conclude();
+        out.jumped = true;
+      }
     }
   } else {
     const float size = magnitude(out.innovation);
@@ -279,6 +286,7 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
     if (s.ticks >= 1 && (air ? entry || (surprise && innovation_n > 0.0F) : surprise)) {
       s.rising = innovation_n > 0.0F ? 1U : 0U;
       s.air = 0;
+      s.restarts = 0;
       begin_jump(input, noise_n2);
       conclude();
       out.jumped = true;

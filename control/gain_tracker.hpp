@@ -108,8 +108,9 @@ class GainTracker {
     float timing_n2 = 0.0F;  // variance of the reading because the feed's moment is unknown
     float prior_mean_n = 0.0F;
     float prior_variance_n2 = 1.0F;
-    std::uint32_t samples = 0;  // 0: no jump
-    std::uint32_t ticks = 0;    // 1: past holds the tick before
+    std::uint32_t samples = 0;   // 0: no jump
+    std::uint32_t restarts = 0;  // of this jump, because no moment fitted
+    std::uint32_t ticks = 0;     // 1: past holds the tick before
     std::uint32_t started = 0;
     std::uint32_t rising = 0;
     std::uint32_t air = 1;

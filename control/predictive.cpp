@@ -268,10 +268,11 @@ bool Predictive::may_rise(const GainTracker::Output& seen, CutPhase phase) noexc
     s.before_jump_n = 0.0F;
     return true;
   }
+  s.suspected_s = s.before_jump_n > 0.0F ? s.suspected_s + config_.period_s : 0.0F;
   if (s.before_jump_n > 0.0F) {
     const bool surely_cutting =
         seen.gain_n - 3.0F * seen.gain_sigma_n > kLost_ratio * s.before_jump_n;
-    const bool light_cut = phase == CutPhase::kCut && s.since_jump_s > kLost_s;
+    const bool light_cut = phase == CutPhase::kCut && s.suspected_s > kLost_s;
     if (surely_cutting || light_cut) s.before_jump_n = 0.0F;
   }
   return s.before_jump_n <= 0.0F && !(seen.jumped && seen.rising);

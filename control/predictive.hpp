@@ -81,6 +81,7 @@ class Predictive {
     float since_jump_s = 100.0F;
     float recovering_s = 100.0F;  // since the override may rise again
     float before_jump_n = 0.0F;   // gain before a jump down, while the cut may be lost; else 0
+    float suspected_s = 0.0F;     // the cut may have been lost for
     float held_s = 0.0F;          // the present code has been sent for
     float trend_1_s = 0.0F;       // relative slope of the gain
     float last_gain_n = 0.0F;

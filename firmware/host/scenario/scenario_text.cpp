@@ -175,8 +175,8 @@ std::string force_scenario_template() {
 
 std::string_view demo_scenario_text() {
   return R"(# The demo: longitudinal turning on a 5.5 kW lathe, 1000 rpm, 50 mm, 0.2 mm a turn in steel. The
-# tool enters at 1 mm depth of cut; at half of the path the depth steps to 1.5 mm. A PI law sets the
-# feed override so that the estimated cutting force stays at 500 N.
+# tool enters at 1 mm depth of cut; at half of the path the depth steps to 1.5 mm. The predictive law
+# sets the feed override so that the estimated cutting force stays at 500 N.
 title = "Step in depth of cut, 1 to 1.5 mm"
 preset = "lathe"
 duration_s = 12
