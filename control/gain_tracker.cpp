@@ -219,6 +219,8 @@ void GainTracker::begin_jump(const Input& input, float noise_n2) noexcept {
   follow(s.past.feed, s.past.feed_sigma, s.past.reading_n, noise_n2, 0);
   follow(input.feed, input.feed_sigma, input.reading_n, noise_n2, 1);
   s.samples = 2;
+  conclude();
+  s.rising = s.gain_n > s.base.gain_n ? 1U : 0U;
 }
 
 void GainTracker::restart() noexcept {
@@ -271,7 +273,6 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
         begin(input);
       } else {
         begin_jump(input, noise_n2);
-        conclude();
         out.jumped = true;
       }
     }
@@ -284,11 +285,9 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
     const bool surprise = size > config_.jump_threshold || again;
     const bool entry = air && (!input.air || innovation_n > input.entry_n);
     if (s.ticks >= 1 && (air ? entry || (surprise && innovation_n > 0.0F) : surprise)) {
-      s.rising = innovation_n > 0.0F ? 1U : 0U;
       s.air = 0;
       s.restarts = 0;
       begin_jump(input, noise_n2);
-      conclude();
       out.jumped = true;
     } else {
       correct(innovation_n, variance_n2);

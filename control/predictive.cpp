@@ -30,8 +30,12 @@ constexpr float kLongestLatency_s = 0.4F;
 constexpr float kMostTicks = static_cast<float>(Predictive::kHistory - 2);
 constexpr float kMarginLeast = 1.6F;  // the loop must bear this much more than the highest gain
 constexpr float kConfidence = 2.0F;   // standard deviations up to it
-constexpr float kLost_ratio = 0.2F;   // of the gain before: less is a lost cut
-constexpr float kLost_s = 0.5F;       // after which a cut that is left is a light one
+constexpr float kTurns_s = 0.6F;      // jumps up and down within this time are in turn
+constexpr float kDoubtGrowth = 1.6F;
+constexpr float kDoubtMost = 16.0F;
+constexpr float kDoubtMemory_s = 20.0F;
+constexpr float kLost_ratio = 0.2F;  // of the gain before: less is a lost cut
+constexpr float kLost_s = 0.5F;      // after which a cut that is left is a light one
 
 LagStep lag_step(const Predictive::Config& config, float length_s) noexcept {
   return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
@@ -128,6 +132,19 @@ void Predictive::find_latency(const Input& input, bool jumped) noexcept {
   const auto found =
       bank_.step({.sent = state_.sent, .reading_n = input.force_n, .usable = usable});
   if (found.latency_s != before_s) assume_latency(found.latency_s);
+}
+
+// Jumps up and down in turn are more likely our own moves, seen at the wrong time, than the part's:
+// then what a move may do at an unknown moment is believed to be more. (C106)
+void Predictive::doubt_timing(const GainTracker::Output& seen) noexcept {
+  State& s = state_;
+  s.timing_doubt += config_.period_s / kDoubtMemory_s * (1.0F - s.timing_doubt);
+  if (!seen.jumped) return;
+  const bool turned = (seen.rising ? 1U : 0U) != s.last_rising;
+  if (turned && s.since_jump_s < kTurns_s) {
+    s.timing_doubt = std::min(kDoubtGrowth * s.timing_doubt, kDoubtMost);
+  }
+  s.last_rising = seen.rising ? 1U : 0U;
 }
 
 // What the override did to the feed since the last tick: mean of v. (C70)-(C73)
@@ -295,9 +312,10 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   const float gain_before_n = tracker_.state().gain_n;
   const auto seen = tracker_.step({.reading_n = input.force_n,
                                    .feed = feed.mean * speed,
-                                   .feed_sigma = feed.sigma * speed,
+                                   .feed_sigma = feed.sigma * speed * s.timing_doubt,
                                    .entry_n = kEntry_ratio * input.force_reference_n,
                                    .air = input.phase == CutPhase::kAir});
+  doubt_timing(seen);
   s.since_jump_s = seen.jumped ? 0.0F : std::min(s.since_jump_s + config_.period_s, 100.0F);
   if (seen.jumped) s.before_jump_n = seen.rising ? 0.0F : std::max(gain_before_n, s.before_jump_n);
 

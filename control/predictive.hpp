@@ -82,8 +82,10 @@ class Predictive {
     float recovering_s = 100.0F;  // since the override may rise again
     float before_jump_n = 0.0F;   // gain before a jump down, while the cut may be lost; else 0
     float suspected_s = 0.0F;     // the cut may have been lost for
-    float held_s = 0.0F;          // the present code has been sent for
-    float trend_1_s = 0.0F;       // relative slope of the gain
+    float timing_doubt = 1.0F;    // times the spread of the dead time
+    std::uint32_t last_rising = 0;
+    float held_s = 0.0F;     // the present code has been sent for
+    float trend_1_s = 0.0F;  // relative slope of the gain
     float last_gain_n = 0.0F;
   };
 
@@ -127,6 +129,7 @@ class Predictive {
   [[nodiscard]] Reach with_margin(Reach reach, const GainTracker::Output& seen) const noexcept;
   [[nodiscard]] float wanted_pct(const Forecast& ahead, const Horizon& horizon,
                                  float reference_n) const noexcept;
+  void doubt_timing(const GainTracker::Output& seen) noexcept;
   void assume_latency(float latency_s) noexcept;
   void find_latency(const Input& input, bool jumped) noexcept;
   [[nodiscard]] float feed_ratio(float w) const noexcept;
