@@ -40,6 +40,7 @@ double settled_true_force_n(EstimatorName estimator, firmware::SpeedSource speed
   auto scenario = committed_scenario("demo_step");
   scenario.simulation.sensors.dynamometer.present = true;
   scenario.machine.speed_source = speed;
+  scenario.machine.controller = firmware::ControllerName::kPi;  // holds what it is told, no less
   double sum_n = 0.0;
   int count = 0;
   for (const auto& row :
