@@ -46,7 +46,8 @@ std::expected<void, Predictive::ConfigError> Predictive::Config::check() const n
     return fail(ConfigError::kLatency);
   if (!(latency_sigma_s >= 0.0F && latency_sigma_s <= 1.0F)) return fail(ConfigError::kLatency);
   if (!(feed_lag_s >= 0.0F && feed_lag_s <= 10.0F && process_lag_s > 0.0F &&
-        process_lag_s <= 10.0F && sensor_lag_s >= 0.0F && sensor_lag_s <= 10.0F))
+        process_lag_s <= 10.0F && sensor_lag_s >= 0.0F && sensor_lag_s <= 10.0F &&
+        apart(process_lag_s, feed_lag_s) && apart(process_lag_s, sensor_lag_s)))
     return fail(ConfigError::kLags);
   if (!(feed_exponent >= 0.3F && feed_exponent <= 1.5F)) return fail(ConfigError::kExponent);
   if (!(process_gain_n > 0.0F && process_gain_n <= 1e7F)) return fail(ConfigError::kGain);
