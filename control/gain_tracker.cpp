@@ -23,12 +23,27 @@ constexpr float kModelSpread_ratio =
     0.06F;  // of a gain that was learned from a jump: the lags are not exact
 constexpr float kBeginSpread_ratio = 0.2F;
 constexpr float kLeastFeed = 0.01F;
-constexpr float kNothing = 0.01F;  // probability that an alarm means nothing
+constexpr float kMostGain_ratio = 1000.0F;  // of the config's: no cut
+constexpr float kNothing = 0.01F;           // probability that an alarm means nothing
 constexpr float kBadFit = 9.0F;
 constexpr float kBadFitEach = 4.0F;
 constexpr std::array<float, 3> kOnset{0.05F, 0.35F, 0.7F};  // parts of a tick
 
 constexpr float square(float x) noexcept { return x * x; }
+
+// A covariance far above that of a reading comes out indefinite in single precision: a variance
+// below zero, and from it a reading's that has no root. No variance is below zero, and no
+// correlation above one.
+void keep_sound(std::array<float, 6>& covariance) noexcept {
+  const auto spread = [&covariance](std::size_t k) {
+    covariance[k] = std::max(covariance[k], 0.0F);
+    return std::sqrt(covariance[k]);
+  };
+  const float f = spread(kFF), s = spread(kSS), k = spread(kKK);
+  covariance[kFs] = std::clamp(covariance[kFs], -f * s, f * s);
+  covariance[kFK] = std::clamp(covariance[kFK], -f * k, f * k);
+  covariance[kSK] = std::clamp(covariance[kSK], -s * k, s * k);
+}
 
 }  // namespace
 
@@ -66,7 +81,7 @@ void GainTracker::begin(const Input& input) noexcept {
   if (!(input.reading_n > input.entry_n && input.feed > kLeastFeed)) return;
   s.air = 0;
   s.force_n = s.sensed_n = input.reading_n;
-  s.gain_n = input.reading_n / input.feed;
+  s.gain_n = std::min(input.reading_n / input.feed, kMostGain_ratio * config_.gain_n);
   s.covariance[kKK] = square(kBeginSpread_ratio * s.gain_n);
   s.covariance[kFF] = square(kBeginSpread_ratio * s.force_n);
 }
@@ -100,6 +115,7 @@ void GainTracker::predict(float feed, float feed_sigma, float drift) noexcept { 
   s.covariance[kFF] += force_n * force_n;
   s.covariance[kFs] += force_n * sensed_n;
   s.covariance[kSS] += sensed_n * sensed_n;
+  keep_sound(s.covariance);
 }
 
 void GainTracker::correct(float innovation_n, float variance_n2) noexcept {  // (C78)
@@ -112,7 +128,7 @@ void GainTracker::correct(float innovation_n, float variance_n2) noexcept {  // 
   s.gain_n += gain_k * innovation_n;
   s.covariance = {p[kFF] - gain_f * p[kFs], p[kFs] - gain_f * p[kSS], p[kFK] - gain_f * p[kSK],
                   p[kSS] - gain_s * p[kSS], p[kSK] - gain_s * p[kSK], p[kKK] - gain_k * p[kSK]};
-  for (const std::size_t k : {kFF, kSS, kKK}) s.covariance[k] = std::max(s.covariance[k], 0.0F);
+  keep_sound(s.covariance);
 }
 
 // The base and each moment's response go one tick on, and the reading is weighed. (C79), (C80)
@@ -194,7 +210,7 @@ void GainTracker::conclude() noexcept {
       }
     }
   }
-  s.gain_n = std::max(s.base.gain_n + gain_n, 0.0F);
+  s.gain_n = std::clamp(s.base.gain_n + gain_n, 0.0F, kMostGain_ratio * config_.gain_n);
   s.force_n = s.base.force_n + force_n;
   s.sensed_n = s.base.sensed_n + sensed_n;
 }
@@ -277,7 +293,7 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
       out.jumped = true;
     } else {
       correct(innovation_n, variance_n2);
-      s.gain_n = std::max(s.gain_n, 0.0F);
+      s.gain_n = std::clamp(s.gain_n, 0.0F, kMostGain_ratio * config_.gain_n);
       const float memory = config_.period_s / (kTrendMemory_s + config_.period_s);
       s.correlation += memory * (out.innovation * s.last_innovation - s.correlation);
       s.power += memory * (square(out.innovation) - s.power);
