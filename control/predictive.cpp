@@ -270,8 +270,10 @@ bool Predictive::may_rise(const GainTracker::Output& seen, CutPhase phase) noexc
     return true;
   }
   if (s.before_jump_n > 0.0F) {
+    // Not with the first two readings: where noise made the first of them low, a force that
+    // vanishes looks like one that falls a little, and earlier.
     const bool surely_cutting =
-        seen.gain_n - 3.0F * seen.gain_sigma_n > kLost_ratio * s.before_jump_n;
+        !seen.jumped && seen.gain_n - 3.0F * seen.gain_sigma_n > kLost_ratio * s.before_jump_n;
     const bool light_cut = phase == CutPhase::kCut && s.since_jump_s > kLost_s;
     if (surely_cutting || light_cut) s.before_jump_n = 0.0F;
   }
