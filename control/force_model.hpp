@@ -16,6 +16,11 @@
 
 namespace cutforce::control {
 
+// Whether two lags are far enough from each other for partial fractions in single precision.
+[[nodiscard]] constexpr bool apart(float lag_s, float other_s) noexcept {
+  return estimator::magnitude(lag_s - other_s) >= 0.01F * other_s;
+}
+
 // Shares of first-order lags over one stretch of time, for one constant w.
 struct LagStep {
   float length_s;
@@ -25,7 +30,7 @@ struct LagStep {
   float sensed_force;  // of the force at the begin
   float sensed_input;  // of K times the mean of v
 
-  // Sensor and cut must not have the very same lag.
+  // Sensor and cut must be apart().
   [[nodiscard]] static constexpr LagStep of(float length_s, float feed_lag_s, float cut_lag_s,
                                             float sensor_lag_s) noexcept {
     const auto decay = [length_s](float lag_s) {

@@ -29,13 +29,28 @@ constexpr float kQuietest = 0.5F;
 constexpr float kLoudest = 10.0F;
 constexpr float kBeginSpread_ratio = 0.2F;
 constexpr float kLeastFeed = 0.01F;
-constexpr float kNothing = 0.01F;  // probability that an alarm means nothing
+constexpr float kMostGain_ratio = 1000.0F;  // of the config's: no cut
+constexpr float kNothing = 0.01F;           // probability that an alarm means nothing
 constexpr std::uint32_t kMostRestarts = 4;
 constexpr float kBadFit = 9.0F;
 constexpr float kBadFitEach = 4.0F;
 constexpr std::array<float, 3> kOnset{0.05F, 0.35F, 0.7F};  // parts of a tick
 
 constexpr float square(float x) noexcept { return x * x; }
+
+// A covariance far above that of a reading comes out indefinite in single precision: a variance
+// below zero, and from it a reading's that has no root. No variance is below zero, and no
+// correlation above one.
+void keep_sound(std::array<float, 6>& covariance) noexcept {
+  const auto spread = [&covariance](std::size_t k) {
+    covariance[k] = std::max(covariance[k], 0.0F);
+    return std::sqrt(covariance[k]);
+  };
+  const float f = spread(kFF), s = spread(kSS), k = spread(kKK);
+  covariance[kFs] = std::clamp(covariance[kFs], -f * s, f * s);
+  covariance[kFK] = std::clamp(covariance[kFK], -f * k, f * k);
+  covariance[kSK] = std::clamp(covariance[kSK], -s * k, s * k);
+}
 
 }  // namespace
 
@@ -73,7 +88,7 @@ void GainTracker::begin(const Input& input) noexcept {
   if (!(input.reading_n > input.entry_n && input.feed > kLeastFeed)) return;
   s.air = 0;
   s.force_n = s.sensed_n = input.reading_n;
-  s.gain_n = input.reading_n / input.feed;
+  s.gain_n = std::min(input.reading_n / input.feed, kMostGain_ratio * config_.gain_n);
   s.covariance[kKK] = square(kBeginSpread_ratio * s.gain_n);
   s.covariance[kFF] = square(kBeginSpread_ratio * s.force_n);
 }
@@ -107,6 +122,7 @@ void GainTracker::predict(float feed, float feed_sigma, float drift) noexcept { 
   s.covariance[kFF] += force_n * force_n;
   s.covariance[kFs] += force_n * sensed_n;
   s.covariance[kSS] += sensed_n * sensed_n;
+  keep_sound(s.covariance);
 }
 
 void GainTracker::correct(float innovation_n, float variance_n2) noexcept {  // (C78)
@@ -119,10 +135,10 @@ void GainTracker::correct(float innovation_n, float variance_n2) noexcept {  // 
   s.gain_n += gain_k * innovation_n;
   s.covariance = {p[kFF] - gain_f * p[kFs], p[kFs] - gain_f * p[kSS], p[kFK] - gain_f * p[kSK],
                   p[kSS] - gain_s * p[kSS], p[kSK] - gain_s * p[kSK], p[kKK] - gain_k * p[kSK]};
-  for (const std::size_t k : {kFF, kSS, kKK}) s.covariance[k] = std::max(s.covariance[k], 0.0F);
+  keep_sound(s.covariance);
 }
 
-// The base and each moment's response go one tick on, and the reading is weighed. (C79), (C80)
+// The base and each moment's response go one tick on, and the reading is weighed. (C80), (C81)
 void GainTracker::follow(float feed, float feed_sigma, float reading_n, float noise_n2,
                          std::uint32_t tick) noexcept {
   State& s = state_;
@@ -201,7 +217,7 @@ void GainTracker::conclude() noexcept {
       }
     }
   }
-  s.gain_n = std::max(s.base.gain_n + gain_n, 0.0F);
+  s.gain_n = std::clamp(s.base.gain_n + gain_n, 0.0F, kMostGain_ratio * config_.gain_n);
   s.force_n = s.base.force_n + force_n;
   s.sensed_n = s.base.sensed_n + sensed_n;
 }
@@ -277,7 +293,7 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
       }
     }
   } else {
-    const float size = magnitude(out.innovation);
+    const float size = magnitude(out.innovation);  // (C79)
     const bool again =
         size > kTwiceThreshold_ratio * config_.jump_threshold &&
         out.innovation * s.last_innovation > 0.0F &&
@@ -291,7 +307,7 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
       out.jumped = true;
     } else {
       correct(innovation_n, variance_n2);
-      s.gain_n = std::max(s.gain_n, 0.0F);
+      s.gain_n = std::clamp(s.gain_n, 0.0F, kMostGain_ratio * config_.gain_n);
       const float memory = config_.period_s / (kTrendMemory_s + config_.period_s);
       s.correlation += memory * (out.innovation * s.last_innovation - s.correlation);
       s.power += memory * (square(out.innovation) - s.power);
@@ -309,7 +325,7 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
   out.rising = s.rising != 0;
   if (s.samples >= kSamples) {
     s.samples = 0;
-    s.covariance[kKK] += square(kModelSpread_ratio * s.gain_n);
+    s.covariance[kKK] += square(kModelSpread_ratio * s.gain_n);  // (C83)
   }
   s.past = before;
   s.ticks = 1;

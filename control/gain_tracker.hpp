@@ -42,7 +42,7 @@ class GainTracker {
     [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
       if (!(period_s > 0.0F && period_s <= 10.0F)) return std::unexpected{ConfigError::kPeriod};
       if (!(cut_lag_s > 0.0F && cut_lag_s <= 100.0F && sensor_lag_s >= 0.0F &&
-            sensor_lag_s <= 100.0F))
+            sensor_lag_s <= 100.0F && apart(cut_lag_s, sensor_lag_s)))
         return std::unexpected{ConfigError::kLags};
       if (!(gain_n > 0.0F && gain_n <= 1e7F)) return std::unexpected{ConfigError::kGain};
       if (!(noise_ratio >= 0.0F && noise_ratio < 1.0F && noise_n > 0.0F && noise_n <= 1e6F))

@@ -39,7 +39,7 @@ class LatencyBank {
       if (!(latency_s >= 0.0F && most_latency_s > 0.0F && most_latency_s <= 100.0F * period_s))
         return std::unexpected{ConfigError::kLatency};
       if (!(feed_lag_s >= 0.0F && feed_lag_s <= 10.0F && cut_lag_s > 0.0F && cut_lag_s <= 10.0F &&
-            sensor_lag_s >= 0.0F && sensor_lag_s <= 10.0F))
+            sensor_lag_s >= 0.0F && sensor_lag_s <= 10.0F && apart(cut_lag_s, sensor_lag_s)))
         return std::unexpected{ConfigError::kLags};
       return {};
     }

@@ -36,6 +36,7 @@ constexpr float kDoubtMost = 16.0F;
 constexpr float kDoubtMemory_s = 20.0F;
 constexpr float kLost_ratio = 0.2F;  // of the gain before: less is a lost cut
 constexpr float kLost_s = 0.5F;      // after which a cut that is left is a light one
+constexpr float kOdd = -1.0F;        // a reading this low (standard deviations) is waited out
 
 LagStep lag_step(const Predictive::Config& config, float length_s) noexcept {
   return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
@@ -50,7 +51,8 @@ std::expected<void, Predictive::ConfigError> Predictive::Config::check() const n
     return fail(ConfigError::kLatency);
   if (!(latency_sigma_s >= 0.0F && latency_sigma_s <= 1.0F)) return fail(ConfigError::kLatency);
   if (!(feed_lag_s >= 0.0F && feed_lag_s <= 10.0F && process_lag_s > 0.0F &&
-        process_lag_s <= 10.0F && sensor_lag_s >= 0.0F && sensor_lag_s <= 10.0F))
+        process_lag_s <= 10.0F && sensor_lag_s >= 0.0F && sensor_lag_s <= 10.0F &&
+        apart(process_lag_s, feed_lag_s) && apart(process_lag_s, sensor_lag_s)))
     return fail(ConfigError::kLags);
   if (!(feed_exponent >= 0.3F && feed_exponent <= 1.5F)) return fail(ConfigError::kExponent);
   if (!(process_gain_n > 0.0F && process_gain_n <= 1e7F)) return fail(ConfigError::kGain);
@@ -287,8 +289,10 @@ bool Predictive::may_rise(const GainTracker::Output& seen, CutPhase phase) noexc
   }
   s.suspected_s = s.before_jump_n > 0.0F ? s.suspected_s + config_.period_s : 0.0F;
   if (s.before_jump_n > 0.0F) {
+    // Not with the first two readings: where noise made the first of them low, a force that
+    // vanishes looks like one that falls a little, and earlier.
     const bool surely_cutting =
-        seen.gain_n - 3.0F * seen.gain_sigma_n > kLost_ratio * s.before_jump_n;
+        !seen.jumped && seen.gain_n - 3.0F * seen.gain_sigma_n > kLost_ratio * s.before_jump_n;
     const bool light_cut = phase == CutPhase::kCut && s.suspected_s > kLost_s;
     if (surely_cutting || light_cut) s.before_jump_n = 0.0F;
   }
@@ -307,6 +311,7 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   const KnownFeed feed = known_feed(input.override_applied_pct);
   if (input.mode == LawMode::kHold) {
     tracker_.coast(feed.mean * speed);
+    if (config_.learns) map_.pass(feed_ratio(feed.mean));  // the tool moves on
     return law_answer(input.override_applied_pct);
   }
   const float gain_before_n = tracker_.state().gain_n;
@@ -334,7 +339,10 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   if (config_.learns) learn(seen, feed.mean, input.phase);
   const Horizon& horizon = horizons_[with_margin(reach(ahead, input.force_reference_n), seen)];
   float wanted = wanted_pct(feared, horizon, input.force_reference_n);
-  if (!rise) wanted = std::min(wanted, input.override_applied_pct);
+  // A low reading in a calm cut may be the first of a broken tool, (C91).
+  const bool odd =
+      input.phase == CutPhase::kCut && s.since_jump_s > kLost_s && seen.innovation < kOdd;
+  if (!rise || odd) wanted = std::min(wanted, input.override_applied_pct);
   if (config_.learns) {
     wanted = std::max(map_.limit({.reference_n = input.force_reference_n,
                                   .ahead_s = ahead.path_s,
