@@ -62,11 +62,10 @@ struct Bench {
     gain_n = to_n;
     const double sigma_n = std::hypot(noise_ratio * cut.sensed_n, noise_n);
     const double reading_n = std::max(cut.sensed_n + sigma_n * normal(random), 0.0);
-    return seen = tracker.step(input(reading_n, feed, sigma_n));
+    return seen = tracker.step(input(reading_n, feed));
   }
-  [[nodiscard]] static GainTracker::Input input(double reading_n, double feed, double sigma_n) {
+  [[nodiscard]] static GainTracker::Input input(double reading_n, double feed) {
     return {.reading_n = static_cast<float>(reading_n),
-            .reading_sigma_n = static_cast<float>(sigma_n),
             .feed = static_cast<float>(feed),
             .feed_sigma = 0.0F,
             .entry_n = 25.0F,
@@ -207,7 +206,7 @@ TEST(GainTracker, FollowsWearAsATrendWithoutAJump) {
 TEST(GainTracker, RemembersTheGainThroughTheAirAndMeetsItAgain) {
   Bench bench;
   for (int i = 0; i < 100; ++i) bench.tick(1.0);
-  auto air = Bench::input(0.0, 2.0, 4.0);
+  auto air = Bench::input(0.0, 2.0);
   air.air = true;
   for (int i = 0; i < 40; ++i) EXPECT_EQ(bench.tracker.step(air).gain_n, 0.0F);
   EXPECT_NEAR(bench.tracker.state().memory_n, 400.0F, 20.0F);
@@ -249,7 +248,7 @@ TEST(GainTracker, DoesNotTakeALateFeedForAJumpWhereItIsToldOfIt) {
       for (int i = 0; i < 8; ++i) {
         bench.cut.tick(i == 0 ? 1.5 : 0.3, 400.0, 400.0, 0.0);
         const double noise_n = 4.0 * bench.normal(bench.random);
-        auto input = Bench::input(bench.cut.sensed_n + noise_n, i == 0 ? 0.9 : 0.3, 4.0);
+        auto input = Bench::input(bench.cut.sensed_n + noise_n, i == 0 ? 0.9 : 0.3);
         if (told && i == 0) input.feed_sigma = 0.6F;
         jumped = bench.tracker.step(input).jumped || jumped;
       }
@@ -305,7 +304,6 @@ TEST(GainTracker, StaysFiniteAndContinuesBitExactlyWithoutAllocating) {
     GainTracker::Input input{
         .reading_n =
             std::ldexp(static_cast<float>(random() % 1000), static_cast<int>(random() % 8)),
-        .reading_sigma_n = random() % 8 == 0 ? static_cast<float>(random() % 100'000) : 0.0F,
         .feed = static_cast<float>(random() % 1000) * 3e-3F,
         .feed_sigma = random() % 4 == 0 ? static_cast<float>(random() % 1000) * 1e-3F : 0.0F,
         .entry_n = 25.0F,
