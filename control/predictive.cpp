@@ -32,6 +32,7 @@ constexpr float kMarginLeast = 1.6F;  // the loop must bear this much more than 
 constexpr float kConfidence = 2.0F;   // standard deviations up to it
 constexpr float kLost_ratio = 0.2F;   // of the gain before: less is a lost cut
 constexpr float kLost_s = 0.5F;       // after which a cut that is left is a light one
+constexpr float kOdd = -1.0F;         // a reading this low (standard deviations) is waited out
 
 LagStep lag_step(const Predictive::Config& config, float length_s) noexcept {
   return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
@@ -319,7 +320,10 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   if (config_.learns) learn(seen, feed.mean, input.phase);
   const Horizon& horizon = horizons_[with_margin(reach(ahead, input.force_reference_n), seen)];
   float wanted = wanted_pct(feared, horizon, input.force_reference_n);
-  if (!rise) wanted = std::min(wanted, input.override_applied_pct);
+  // A low reading in a calm cut may be the first of a broken tool, (C91).
+  const bool odd =
+      input.phase == CutPhase::kCut && s.since_jump_s > kLost_s && seen.innovation < kOdd;
+  if (!rise || odd) wanted = std::min(wanted, input.override_applied_pct);
   if (config_.learns) {
     wanted = std::max(map_.limit({.reference_n = input.force_reference_n,
                                   .ahead_s = ahead.path_s,
