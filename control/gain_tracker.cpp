@@ -131,7 +131,7 @@ void GainTracker::correct(float innovation_n, float variance_n2) noexcept {  // 
   keep_sound(s.covariance);
 }
 
-// The base and each moment's response go one tick on, and the reading is weighed. (C79), (C80)
+// The base and each moment's response go one tick on, and the reading is weighed. (C80), (C81)
 void GainTracker::follow(float feed, float feed_sigma, float reading_n, float noise_n2,
                          std::uint32_t tick) noexcept {
   State& s = state_;
@@ -278,7 +278,7 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
       out.jumped = true;
     }
   } else {
-    const float size = magnitude(out.innovation);
+    const float size = magnitude(out.innovation);  // (C79)
     const bool again =
         size > kTwiceThreshold_ratio * config_.jump_threshold &&
         out.innovation * s.last_innovation > 0.0F &&
@@ -306,7 +306,7 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
   out.rising = s.rising != 0;
   if (s.samples >= kSamples) {
     s.samples = 0;
-    s.covariance[kKK] += square(kModelSpread_ratio * s.gain_n);
+    s.covariance[kKK] += square(kModelSpread_ratio * s.gain_n);  // (C83)
   }
   s.past = before;
   s.ticks = 1;

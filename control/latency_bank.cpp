@@ -88,7 +88,7 @@ auto LatencyBank::step(const Input& input) noexcept -> Output {
   const float present = s.chains[0].misfit;
   const float ratio = present > 0.0F ? s.chains[best].misfit / present : 1.0F;
   if (told) judge(best);
-  return {.latency_s = s.latency_s, .misfit_ratio = ratio};
+  return {.latency_s = s.latency_s, .misfit_ratio = ratio};  // (C103)
 }
 
 }  // namespace cutforce::control

@@ -54,7 +54,7 @@ void PathMap::learn(const Lesson& lesson) noexcept {
   s.earlier_s = {s.position_s, s.earlier_s[0]};
   s.position_s += went_s;  // (C92)
   if (s.started == 0) return;
-  // Where the tool was when the force arose that has just been read.
+  // Where the tool was when the force arose that has just been read. (C99)
   const float late_s = config_.sensor_lag_s + 0.5F * config_.period_s;
   const float seen_s = s.position_s - lesson.feed_ratio * late_s;
   if (lesson.jumped) {
@@ -72,6 +72,7 @@ void PathMap::learn(const Lesson& lesson) noexcept {
   const float then_n =
       config_.gain_n * power_positive(static_cast<float>(known) / kScale, -config_.feed_exponent);
   const float ratio = lesson.gain_n / then_n;
+  // (C98)
   if (!(ratio * kFar_ratio > s.wear_ratio && ratio < kFar_ratio * s.wear_ratio)) return;
   const float share = config_.period_s / (kWearMemory_s + config_.period_s);
   s.wear_ratio = std::clamp(s.wear_ratio + share * (ratio - s.wear_ratio), kWearLeast, kWearMost);

@@ -1,5 +1,5 @@
 // What the last part taught: at which feed the force would have been at the reference, along the
-// controller's own path. Equations (C92)-(C97).
+// controller's own path. Equations (C92)-(C99).
 //
 // The path coordinate x is the feed that the override must have made, in seconds at 100 %; it needs
 // no position from the CNC, only the moment at which a part, or a repeated block, starts. A

@@ -1,7 +1,7 @@
 // The predictive law: the default. From the override that was really sent it knows what the force
 // must be; what differs is the process gain. It predicts the force over the dead time with a
 // pessimistic gain and sets the override that brings it to the reference within a horizon. It
-// retreats within one tick and recovers slowly. Equations (C70)-(C99).
+// retreats within one tick and recovers slowly. Equations (C70)-(C75), (C84)-(C91), (C104), (C105).
 //
 //   known input -> GainTracker -> pessimistic gain -> prediction over the dead time -> one step
 //   of model predictive control in closed form -> a code that the CNC has -> guards
