@@ -48,11 +48,15 @@ void PathMap::write_to(float position_s, float gain_n) noexcept {
   for (; s.written < end; ++s.written) s.recorded[s.written] = cell;
 }
 
+void PathMap::pass(float feed_ratio) noexcept {  // (C92)
+  State& s = state_;
+  s.earlier_s = {s.position_s, s.earlier_s[0]};
+  s.position_s += feed_ratio * config_.period_s;
+}
+
 void PathMap::learn(const Lesson& lesson) noexcept {
   State& s = state_;
-  const float went_s = lesson.feed_ratio * config_.period_s;
-  s.earlier_s = {s.position_s, s.earlier_s[0]};
-  s.position_s += went_s;  // (C92)
+  pass(lesson.feed_ratio);
   if (s.started == 0) return;
   // Where the tool was when the force arose that has just been read. (C99)
   const float late_s = config_.sensor_lag_s + 0.5F * config_.period_s;

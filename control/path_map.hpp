@@ -86,7 +86,8 @@ class PathMap {
 
   // A part begins: what the last one taught is kept.
   void start() noexcept;
-  // Once a tick, before limit().
+  // Once a tick, before limit(): a tick without anything to learn, or one with.
+  void pass(float feed_ratio) noexcept;
   void learn(const Lesson& lesson) noexcept;
   // The override that the map allows; the wanted one where it has nothing against it.
   [[nodiscard]] float limit(const Question& question) noexcept;

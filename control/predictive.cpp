@@ -293,6 +293,7 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   const KnownFeed feed = known_feed(input.override_applied_pct);
   if (input.mode == LawMode::kHold) {
     tracker_.coast(feed.mean * speed);
+    if (config_.learns) map_.pass(feed_ratio(feed.mean));  // the tool moves on
     return law_answer(input.override_applied_pct);
   }
   const float gain_before_n = tracker_.state().gain_n;
