@@ -107,7 +107,7 @@ inline std::vector<LatheTick> cut(PredictivePath& path, const hal::host::ForceMa
     const double speed =
         part.speed_present ? static_cast<double>(sample.speed_rad_s) / programmed_rad_s : 1.0;
     const auto output = path.step({.force_n = sample.measured_force_n,
-                                   .force_sigma_n = 0.0F,
+                                   .force_sigma_n = 4.0F,  // noise below zero is no fault
                                    .force_age_ticks = 0,
                                    .override_reported_pct = 0.0F,
                                    .spindle_ratio = static_cast<float>(speed),
