@@ -23,9 +23,9 @@ constexpr float kModelSpread_ratio =
     0.06F;  // of a gain that was learned from a jump: the lags are not exact
 // The noise is matched to what is seen in a calm cut: a variance over the configured one.
 constexpr float kNoiseMemory_s = 20.0F;
-constexpr float kUsual = 3.0F;         // standard deviations; more is no noise
-constexpr float kUsualPower = 0.973F;  // of a normal variable that is cut off there
-constexpr float kQuietest = 1.0F;      // what the config says, at least
+constexpr float kUsual = 3.0F;       // standard deviations; more is no noise
+constexpr float kUsualPower = 0.9F;  // of a normal variable that is cut off there, less a margin
+constexpr float kQuietest = 1.0F;    // what the config says, at least
 constexpr float kLoudest = 10.0F;
 constexpr float kBeginSpread_ratio = 0.2F;
 constexpr float kLeastFeed = 0.01F;

@@ -61,12 +61,15 @@ void PathMap::learn(const Lesson& lesson) noexcept {
   // Where the tool was when the force arose that has just been read. (C99)
   const float late_s = config_.sensor_lag_s + 0.5F * config_.period_s;
   const float seen_s = s.position_s - lesson.feed_ratio * late_s;
-  if (lesson.jumped) {
+  if (lesson.jumped && s.resolving == 0) {
     // Up to where the jump may have been, the old gain holds. After a jump down it holds until now.
-    write_to(lesson.rising ? s.earlier_s[1] : seen_s, s.last_gain_n);
+    // Which it was is decided once: what looks different a tick later is the same surprise.
+    s.rising = lesson.rising ? 1U : 0U;
+    if (lesson.rising) write_to(s.earlier_s[1], s.last_gain_n);
   }
+  s.resolving = lesson.resolving ? 1U : 0U;
   if (lesson.resolving) {
-    if (!lesson.rising) write_to(seen_s, s.last_gain_n);
+    if (s.rising == 0) write_to(seen_s, s.last_gain_n);
     return;
   }
   write_to(seen_s, lesson.gain_n);
@@ -149,6 +152,7 @@ void PathMap::start() noexcept {  // (C96)
   s.doubt_s = 0.0F;
   s.wear_ratio = 1.0F;
   s.written = 0;
+  s.resolving = 0;
   s.started = 1;
   s.trusted = 1;
 }

@@ -69,11 +69,13 @@ class PathMap {
     float position_s = 0.0F;                       // of the tool, at 100 %
     std::array<float, 2> earlier_s{};              // one and two ticks ago
     float wear_ratio = 1.0F;
-    float last_gain_n = 0.0F;   // settled, before a jump
-    float doubt_s = 0.0F;       // the map has held the force down for
-    float doubt_from_s = 0.0F;  // and since this place
-    std::uint32_t written = 0;  // cells of this part
-    std::uint32_t started = 0;  // 1: a part has begun
+    float last_gain_n = 0.0F;     // settled, before a jump
+    float doubt_s = 0.0F;         // the map has held the force down for
+    float doubt_from_s = 0.0F;    // and since this place
+    std::uint32_t resolving = 0;  // a jump is being followed
+    std::uint32_t rising = 0;     // which began upwards
+    std::uint32_t written = 0;    // cells of this part
+    std::uint32_t started = 0;    // 1: a part has begun
     std::uint32_t trusted = 1;
   };
 

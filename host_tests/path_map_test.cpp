@@ -221,7 +221,7 @@ TEST(PathMap, MakesTheSecondPartOfAKindGentle) {
     EXPECT_GT(first.above_ns, 20.0);
     EXPECT_LT(second.above_ns, 0.05 * first.above_ns);
     EXPECT_LT(second.peak_n, 1.10 * 500.0);
-    EXPECT_LT(second.time_s, 1.08 * first.time_s);
+    EXPECT_LT(second.time_s, 1.10 * first.time_s);  // nothing but steps: 8 % is the mark of a suite
   }
 }
 
