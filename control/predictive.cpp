@@ -9,35 +9,19 @@ namespace {
 using estimator::exp_bounded;
 using estimator::power_positive;
 
-constexpr float kSpreadFree = 0.04F;  // spread of the gain that is not feared
-constexpr float kSpreadMost = 0.6F;
-constexpr float kWary = 1.0F;     // times the caution while a jump upwards is learned
-constexpr float kLead = 0.5862F;  // of a gain that drifts upwards
 constexpr float kAfterJump_s = 0.35F;
 constexpr float kAfterJump_1_s = 4.835F;  // faster recovery while a jump is being learned
-constexpr float kDeepRetreat_s = 0.4F;    // after a jump
-constexpr float kAbove_ratio = 1.04F;
-constexpr float kFarAbove_ratio = 1.15F;
 constexpr float kMiddle_s = 0.2F;
-constexpr float kOver_ratio = 1.05F;  // static force of a command, over the reference
-constexpr float kOverAfterJump_ratio = 1.15F;
-constexpr float kKeep_ratio = 0.03F;  // of the override: not worth a change at first
-constexpr float kKeepFade_s = 1.5F;
-constexpr float kCoarse_ratio = 0.04F;  // of the override: coarser steps are rounded down
 constexpr float kEntry_ratio = 0.05F;   // of the reference: a reading above it ends the air
 constexpr float kTelling_ratio = 0.2F;  // of the reference: force that tells of the dead time
 constexpr float kLongestLatency_s = 0.4F;
 constexpr float kMostTicks = static_cast<float>(Predictive::kHistory - 2);
-constexpr float kMarginLeast = 1.6F;  // the loop must bear this much more than the highest gain
-constexpr float kConfidence = 2.0F;   // standard deviations up to it
-constexpr float kTurns_s = 0.6F;      // jumps up and down within this time are in turn
+constexpr float kTurns_s = 0.6F;  // jumps up and down within this time are in turn
 constexpr float kDoubtGrowth = 1.6F;
 constexpr float kDoubtMost = 16.0F;
 constexpr float kDoubtMemory_s = 20.0F;
-constexpr float kLost_ratio = 0.2F;       // of the gain before: less is a lost cut
-constexpr float kLongSuspected_s = 1.0F;  // at the most, however the gain goes on jumping
-constexpr float kLost_s = 0.5F;           // after which a cut that is left is a light one
-constexpr float kOdd = -1.0F;             // a reading this low (standard deviations) is waited out
+constexpr float kLost_s = 0.5F;  // after which a cut that is left is a light one
+constexpr float kOdd = -1.0F;    // a reading this low (standard deviations) is waited out
 
 LagStep lag_step(const Predictive::Config& config, float length_s) noexcept {
   return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
@@ -168,86 +152,6 @@ auto Predictive::known_feed(float applied_pct) noexcept -> KnownFeed {
           .sigma = estimator::magnitude(step) * config_.latency_sigma_s / config_.period_s};
 }
 
-// To the end of the dead time, with the codes that are on their way. (C86)
-auto Predictive::forecast(float force_n, float drive_n) const noexcept -> Forecast {
-  FeedState feed = state_.feed;
-  float path_s = 0.0F;
-  const auto go = [&](const LagStep& step, float w) {
-    const float mean = feed.advance(step, config_.feed_lag_s, w);
-    path_s += step.length_s * feed_ratio(mean);
-    force_n = step.cut * force_n + (1.0F - step.cut) * drive_n * mean;
-  };
-  if (early_.length_s > 0.0F) go(early_, state_.sent[whole_ticks_]);
-  for (std::size_t k = whole_ticks_; k > 0; --k) go(tick_, state_.sent[k - 1]);
-  return {.force_n = force_n, .feed = feed.v, .path_s = path_s, .drive_n = drive_n};
-}
-
-// (C84), (C85)
-float Predictive::pessimistic_gain_n(const GainTracker::Output& seen) noexcept {
-  State& s = state_;
-  const float period_s = config_.period_s;
-  if (!(seen.gain_n > 0.0F)) {
-    s.last_gain_n = 0.0F;
-    return 0.0F;
-  }
-  if (s.last_gain_n > 0.0F && !seen.resolving) {
-    const float slope_1_s = (seen.gain_n - s.last_gain_n) / (seen.gain_n * period_s);
-    s.trend_1_s += period_s / (0.25F + period_s) * (slope_1_s - s.trend_1_s);
-  } else {
-    s.trend_1_s = 0.0F;
-  }
-  s.last_gain_n = seen.gain_n;
-  const float spread = std::min(seen.gain_sigma_n / seen.gain_n, kSpreadMost);
-  const float caution = config_.caution_ratio * (seen.resolving && seen.rising ? kWary : 1.0F);
-  const float ahead_s = bank_.state().latency_s + period_s + 0.5F * config_.process_lag_s;
-  const float lead =
-      seen.trend > 0.1F ? std::clamp(kLead * s.trend_1_s * ahead_s, 0.0F, 0.3F) : 0.0F;
-  return seen.gain_n * (1.0F + caution * std::max(spread - kSpreadFree, 0.0F)) * (1.0F + lead);
-}
-
-// (C87)
-auto Predictive::reach(const Forecast& ahead, float reference_n) noexcept -> Reach {
-  const bool recent = state_.since_jump_s < kDeepRetreat_s;
-  if (ahead.force_n > kAbove_ratio * reference_n) {
-    return recent || ahead.force_n > kFarAbove_ratio * reference_n ? kOneTick : kMiddle;
-  }
-  return recent ? kTwoTicks : kCalm;
-}
-
-// How many times the gain that the law works with the true one may be. (C104)
-float Predictive::stable_gain_ratio(const Horizon& horizon) const noexcept {
-  const float decay = tick_.cut;
-  const float loop = horizon.force / (1.0F - horizon.force) * (1.0F - decay);
-  return 1.0F + (1.0F - estimator::magnitude(decay - loop)) / (loop * dead_decay_);
-}
-
-// A longer horizon while the gain may be too uncertain for a short one. (C105)
-auto Predictive::with_margin(Reach reach, const GainTracker::Output& seen) const noexcept -> Reach {
-  const float highest_n = seen.gain_n + kConfidence * seen.gain_sigma_n;
-  while (reach != kCalm &&
-         stable_gain_ratio(horizons_[reach]) * state_.feared_n < kMarginLeast * highest_n) {
-    reach = static_cast<Reach>(reach + 1);
-  }
-  return reach;
-}
-
-// The override that brings the force to the reference at the end of the horizon. (C88), (C89)
-float Predictive::wanted_pct(const Forecast& ahead, const Horizon& horizon,
-                             float reference_n) const noexcept {
-  if (!(ahead.drive_n > 1e-3F * reference_n)) return config_.ceiling_pct;
-  const float own = 1.0F - horizon.force - horizon.feed;
-  const float w =
-      (reference_n - horizon.force * ahead.force_n - ahead.drive_n * horizon.feed * ahead.feed) /
-      (ahead.drive_n * own);
-  const float over = state_.since_jump_s < kLost_s ? kOverAfterJump_ratio : kOver_ratio;
-  const float most = over * reference_n / ahead.drive_n;
-  const float limited = std::min(w, most);
-  if (!(limited > 1e-4F)) return config_.floor_pct;
-  if (limited > 1e4F) return config_.ceiling_pct;
-  return std::clamp(100.0F * power_positive(limited, 1.0F / config_.feed_exponent),
-                    config_.floor_pct, config_.ceiling_pct);
-}
-
 float Predictive::feed_ratio(float w) const noexcept {
   return w > 1e-4F ? power_positive(w, 1.0F / config_.feed_exponent) : 0.0F;
 }
@@ -260,45 +164,6 @@ void Predictive::learn(const GainTracker::Output& seen, float feed, CutPhase pha
               .rising = seen.rising,
               .resolving = seen.resolving,
               .steady = settled && seen.trend < 0.3F});
-}
-
-// A code that the CNC has, and not a new one for nothing. (C90)
-float Predictive::as_code(float wanted_pct, float sent_pct) noexcept {
-  const auto step = static_cast<float>(config_.step_pct);
-  const auto down = [step](float pct) {
-    return step * static_cast<float>(static_cast<std::int32_t>(pct / step + 1e-3F));
-  };
-  if (step > kCoarse_ratio * wanted_pct) {
-    if (wanted_pct > sent_pct - 0.15F * step && wanted_pct < sent_pct + 1.25F * step) {
-      return sent_pct;
-    }
-    return std::max(down(wanted_pct), config_.floor_pct);
-  }
-  const float fade = exp_bounded(-state_.held_s / kKeepFade_s);
-  const float keep = std::max(0.6F * step, kKeep_ratio * wanted_pct * fade);
-  const float apart = wanted_pct - sent_pct;
-  if (apart <= keep && apart >= -keep) return sent_pct;
-  return down(wanted_pct + 0.5F * step);
-}
-
-// Not with a jump upwards, and not while the tool may be broken. (C91)
-bool Predictive::may_rise(const GainTracker::Output& seen, CutPhase phase) noexcept {
-  State& s = state_;
-  if (phase == CutPhase::kAir && !seen.resolving) {
-    s.before_jump_n = 0.0F;
-    return true;
-  }
-  s.suspected_s = s.before_jump_n > 0.0F ? s.suspected_s + config_.period_s : 0.0F;
-  if (s.before_jump_n > 0.0F) {
-    // Not with the first two readings: where noise made the first of them low, a force that
-    // vanishes looks like one that falls a little, and earlier.
-    const bool surely_cutting =
-        !seen.jumped && seen.gain_n - 3.0F * seen.gain_sigma_n > kLost_ratio * s.before_jump_n;
-    const bool light_cut =
-        phase == CutPhase::kCut && (s.since_jump_s > kLost_s || s.suspected_s > kLongSuspected_s);
-    if (surely_cutting || light_cut) s.before_jump_n = 0.0F;
-  }
-  return s.before_jump_n <= 0.0F && !(seen.jumped && seen.rising);
 }
 
 auto Predictive::step(const Input& input) noexcept -> Output {
