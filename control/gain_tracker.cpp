@@ -101,7 +101,9 @@ void GainTracker::predict(float feed, float feed_sigma, float drift) noexcept { 
 
   const float fk = (1.0F - lag_.cut) * feed;
   const float sk = lag_.sensed_input * feed;
-  const float ff = lag_.cut, sf = lag_.sensed_force, ss = lag_.sensed;
+  const float ff = lag_.cut;
+  const float sf = lag_.sensed_force;
+  const float ss = lag_.sensed;
   const auto p = s.covariance;
   // Rows of A P.
   const float f_f = ff * p[kFF] + fk * p[kFK];
@@ -129,7 +131,9 @@ void GainTracker::correct(float innovation_n, float variance_n2) noexcept {  // 
   State& s = state_;
   const auto p = s.covariance;
   const float over = 1.0F / variance_n2;
-  const float gain_f = p[kFs] * over, gain_s = p[kSS] * over, gain_k = p[kSK] * over;
+  const float gain_f = p[kFs] * over;
+  const float gain_s = p[kSS] * over;
+  const float gain_k = p[kSK] * over;
   s.force_n += gain_f * innovation_n;
   s.sensed_n += gain_s * innovation_n;
   s.gain_n += gain_k * innovation_n;
@@ -173,7 +177,9 @@ void GainTracker::follow(float feed, float feed_sigma, float reading_n, float no
 void GainTracker::conclude() noexcept {
   State& s = state_;
   const float prior = 1.0F / s.prior_variance_n2;
-  std::array<float, kMoments + 1> cost{}, jump_n{}, variance_n2{};
+  std::array<float, kMoments + 1> cost{};
+  std::array<float, kMoments + 1> jump_n{};
+  std::array<float, kMoments + 1> variance_n2{};
   s.misfit = s.residual;
   cost[kMoments] = s.residual + 2.0F * -estimator::log_positive(kNothing);
   variance_n2[kMoments] = s.base.variance_n2;
@@ -195,7 +201,9 @@ void GainTracker::conclude() noexcept {
     share[k] = exp_bounded(0.5F * (best - cost[k]));
     sum += share[k];
   }
-  float gain_n = 0.0F, force_n = 0.0F, sensed_n = 0.0F;
+  float gain_n = 0.0F;
+  float force_n = 0.0F;
+  float sensed_n = 0.0F;
   for (std::size_t k = 0; k <= kMoments; ++k) {
     share[k] /= sum;
     const Moment m = k < kMoments ? s.moments[k] : Moment{};
@@ -254,11 +262,55 @@ void GainTracker::coast(float feed) noexcept {
   state_.ticks = 0;
 }
 
+// A jump that is being followed: one more reading. True iff it begins again. (C83)
+bool GainTracker::follow_on(const Input& input, float noise_n2) noexcept {
+  State& s = state_;
+  ++s.samples;
+  follow(input.feed, input.feed_sigma, input.reading_n, noise_n2, s.samples - 1);
+  conclude();
+  if (!(s.misfit > kBadFit + kBadFitEach * static_cast<float>(s.samples))) return false;
+  // No moment explains it: look again from here, and in the end give up the model's past.
+  if (++s.restarts > kMostRestarts) {
+    s.samples = 0;
+    begin(input);
+    return false;
+  }
+  begin_jump(input, noise_n2);
+  return true;
+}
+
+bool GainTracker::surprises(const Input& input, float innovation,
+                            float innovation_n) const noexcept {  // (C79)
+  const State& s = state_;
+  if (s.ticks < 1) return false;
+  const float size = magnitude(innovation);
+  const float twice = kTwiceThreshold_ratio * config_.jump_threshold;
+  const bool again =
+      size > twice && innovation * s.last_innovation > 0.0F && magnitude(s.last_innovation) > twice;
+  const bool surprise = size > config_.jump_threshold || again;
+  if (s.air == 0) return surprise;
+  return !input.air || innovation_n > input.entry_n || (surprise && innovation_n > 0.0F);
+}
+
+// What a calm reading tells of trend, noise and the gain to remember.
+void GainTracker::note_calm(float innovation, float trend) noexcept {
+  State& s = state_;
+  const float memory = config_.period_s / (kTrendMemory_s + config_.period_s);
+  s.correlation += memory * (innovation * s.last_innovation - s.correlation);
+  s.power += memory * (square(innovation) - s.power);
+  if (s.air != 0) return;
+  if (magnitude(innovation) < kUsual && trend < kTrendFloor) {
+    const float slow = config_.period_s / (kNoiseMemory_s + config_.period_s);
+    s.noise_scale *= 1.0F + slow * (square(innovation) / kUsualPower - 1.0F);
+    s.noise_scale = std::clamp(s.noise_scale, kQuietest, kLoudest);
+  }
+  if (s.covariance[kKK] < square(kSettled_ratio * s.gain_n)) s.memory_n = s.gain_n;
+}
+
 auto GainTracker::step(const Input& input) noexcept -> Output {
   State& s = state_;
   if (s.started == 0) begin(input);
   if (input.air && s.air == 0 && s.samples == 0) settle_in_air();
-  const bool air = s.air != 0;
   const Point before{.force_n = s.force_n,
                      .sensed_n = s.sensed_n,
                      .gain_n = s.gain_n,
@@ -272,68 +324,41 @@ auto GainTracker::step(const Input& input) noexcept -> Output {
       std::sqrt(config_.period_s);
   const float noise_n2 =
       s.noise_scale * (square(config_.noise_ratio * input.reading_n) + square(config_.noise_n));
-  Output out{};
   predict(input.feed, input.feed_sigma, drift);
   const float innovation_n = input.reading_n - s.sensed_n;
   const float variance_n2 = s.covariance[kSS] + noise_n2;
-  out.innovation = innovation_n / std::sqrt(variance_n2);
+  const float innovation = innovation_n / std::sqrt(variance_n2);
 
+  bool jumped = false;
   if (s.samples > 0) {
-    ++s.samples;
-    follow(input.feed, input.feed_sigma, input.reading_n, noise_n2, s.samples - 1);
-    conclude();
-    if (s.misfit > kBadFit + kBadFitEach * static_cast<float>(s.samples)) {
-      // No moment explains it: look again from here, and in the end give up the model's past.
-      if (++s.restarts > kMostRestarts) {
-        s.samples = 0;
-        begin(input);
-      } else {
-        begin_jump(input, noise_n2);
-        out.jumped = true;
-      }
-    }
+    jumped = follow_on(input, noise_n2);
+  } else if (surprises(input, innovation, innovation_n)) {
+    s.air = 0;
+    s.restarts = 0;
+    begin_jump(input, noise_n2);
+    jumped = true;
   } else {
-    const float size = magnitude(out.innovation);  // (C79)
-    const bool again =
-        size > kTwiceThreshold_ratio * config_.jump_threshold &&
-        out.innovation * s.last_innovation > 0.0F &&
-        magnitude(s.last_innovation) > kTwiceThreshold_ratio * config_.jump_threshold;
-    const bool surprise = size > config_.jump_threshold || again;
-    const bool entry = air && (!input.air || innovation_n > input.entry_n);
-    if (s.ticks >= 1 && (air ? entry || (surprise && innovation_n > 0.0F) : surprise)) {
-      s.air = 0;
-      s.restarts = 0;
-      begin_jump(input, noise_n2);
-      out.jumped = true;
-    } else {
-      correct(innovation_n, variance_n2);
-      s.gain_n = std::clamp(s.gain_n, 0.0F, kMostGain_ratio * config_.gain_n);
-      const float memory = config_.period_s / (kTrendMemory_s + config_.period_s);
-      s.correlation += memory * (out.innovation * s.last_innovation - s.correlation);
-      s.power += memory * (square(out.innovation) - s.power);
-      if (!air && size < kUsual && trend < kTrendFloor) {
-        const float slow = config_.period_s / (kNoiseMemory_s + config_.period_s);
-        s.noise_scale *= 1.0F + slow * (square(out.innovation) / kUsualPower - 1.0F);
-        s.noise_scale = std::clamp(s.noise_scale, kQuietest, kLoudest);
-      }
-      if (!air && s.covariance[kKK] < square(kSettled_ratio * s.gain_n)) s.memory_n = s.gain_n;
-    }
+    correct(innovation_n, variance_n2);
+    s.gain_n = std::clamp(s.gain_n, 0.0F, kMostGain_ratio * config_.gain_n);
+    note_calm(innovation, trend);
   }
-  s.last_innovation = s.samples > 0 ? 0.0F : out.innovation;
-  if (s.samples > 0) s.correlation = 0.0F;
-  out.resolving = s.samples > 0;
-  out.rising = s.rising != 0;
+  const bool resolving = s.samples > 0;
+  s.last_innovation = resolving ? 0.0F : innovation;
+  if (resolving) s.correlation = 0.0F;
   if (s.samples >= kSamples) {
     s.samples = 0;
     s.covariance[kKK] += square(kModelSpread_ratio * s.gain_n);  // (C83)
   }
   s.past = before;
   s.ticks = 1;
-  out.force_n = std::max(s.force_n, 0.0F);
-  out.gain_n = s.gain_n;
-  out.gain_sigma_n = std::sqrt(s.covariance[kKK]);
-  out.trend = trend;
-  return out;
+  return {.force_n = std::max(s.force_n, 0.0F),
+          .gain_n = s.gain_n,
+          .gain_sigma_n = std::sqrt(s.covariance[kKK]),
+          .trend = trend,
+          .innovation = innovation,
+          .jumped = jumped,
+          .resolving = resolving,
+          .rising = s.rising != 0};
 }
 
 }  // namespace cutforce::control

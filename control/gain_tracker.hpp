@@ -138,6 +138,10 @@ class GainTracker {
   void follow(float feed, float feed_sigma, float reading_n, float noise_n2,
               std::uint32_t tick) noexcept;
   void conclude() noexcept;
+  [[nodiscard]] bool follow_on(const Input& input, float noise_n2) noexcept;
+  [[nodiscard]] bool surprises(const Input& input, float innovation,
+                               float innovation_n) const noexcept;
+  void note_calm(float innovation, float trend) noexcept;
   void begin(const Input& input) noexcept;
   void settle_in_air() noexcept;
 

@@ -129,7 +129,10 @@ float PathMap::limit(const Question& question) noexcept {
 void PathMap::start() noexcept {  // (C96)
   State& s = state_;
   for (std::size_t k = 0; k < s.written; ++k) {
-    std::uint32_t low = s.recorded[k], high = low, sum = 0, count = 0;
+    std::uint32_t low = s.recorded[k];
+    std::uint32_t high = low;
+    std::uint32_t sum = 0;
+    std::uint32_t count = 0;
     const std::size_t end = std::min<std::size_t>(k + 3, s.written);
     for (std::size_t n = k < 2 ? 0 : k - 2; n < end; ++n) {
       const std::uint32_t value = s.recorded[n];
