@@ -74,10 +74,10 @@ class FuzzyPi {
 
   // The step in override for an error and its change; odd in both together, to the bit.
   [[nodiscard]] constexpr float step_pct(float error_n, float change_n) const noexcept {
-    if (error_n < 0.0F || (!(error_n > 0.0F) && change_n < 0.0F))
-      return -step_pct(-error_n, -change_n);
-    return step_pct_label_ *
-           centroid(strengths(error_n * error_label_n_, change_n * change_label_n_));
+    const bool mirrored = error_n < 0.0F || (!(error_n > 0.0F) && change_n < 0.0F);
+    const float sign = mirrored ? -1.0F : 1.0F;
+    return sign * step_pct_label_ *
+           centroid(strengths(sign * error_n * error_label_n_, sign * change_n * change_label_n_));
   }
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
@@ -115,7 +115,8 @@ class FuzzyPi {
     for (int i = 0; i < 2; ++i) {
       for (int k = 0; k < 2; ++k) {
         const int set = std::clamp(e.lower + i + d.lower + k, -kOuter, kOuter);
-        float& strongest = strength[static_cast<std::size_t>(set + kOuter + 1)];
+        const auto place = static_cast<unsigned>(set + kOuter + 1);
+        float& strongest = strength[place];
         strongest = std::max(strongest, std::min(e.part[static_cast<std::size_t>(i)],
                                                  d.part[static_cast<std::size_t>(k)]));
       }

@@ -46,7 +46,9 @@ void keep_sound(std::array<float, 6>& covariance) noexcept {
     covariance[k] = std::max(covariance[k], 0.0F);
     return std::sqrt(covariance[k]);
   };
-  const float f = spread(kFF), s = spread(kSS), k = spread(kKK);
+  const float f = spread(kFF);
+  const float s = spread(kSS);
+  const float k = spread(kKK);
   covariance[kFs] = std::clamp(covariance[kFs], -f * s, f * s);
   covariance[kFK] = std::clamp(covariance[kFK], -f * k, f * k);
   covariance[kSK] = std::clamp(covariance[kSK], -s * k, s * k);

@@ -166,6 +166,27 @@ void Predictive::learn(const GainTracker::Output& seen, float feed, CutPhase pha
               .steady = settled && seen.trend < 0.3F});
 }
 
+// A gain that was higher is forgotten slowly, faster once rising is allowed again. (C85)
+void Predictive::fear(const GainTracker::Output& seen, float gain_n, bool rise,
+                      CutPhase phase) noexcept {
+  State& s = state_;
+  s.recovering_s =
+      seen.jumped || !rise ? 0.0F : std::min(s.recovering_s + config_.period_s, 100.0F);
+  const float rate = s.recovering_s < kAfterJump_s ? kAfterJump_1_s : config_.recovery_1_s;
+  const float kept = rise ? s.feared_n * exp_bounded(-rate * config_.period_s) : s.feared_n;
+  s.feared_n = phase == CutPhase::kAir && !seen.resolving ? 0.0F : std::max(gain_n, kept);
+}
+
+float Predictive::within_map(float wanted_pct, const Forecast& ahead, const Input& input) noexcept {
+  return std::max(map_.limit({.reference_n = input.force_reference_n,
+                              .ahead_s = ahead.path_s,
+                              .force_n = ahead.force_n,
+                              .override_pct = wanted_pct,
+                              .spindle_ratio = input.spindle_ratio,
+                              .air = input.phase == CutPhase::kAir}),
+                  config_.floor_pct);
+}
+
 auto Predictive::step(const Input& input) noexcept -> Output {
   State& s = state_;
   if (input.part_start) {
@@ -193,11 +214,7 @@ auto Predictive::step(const Input& input) noexcept -> Output {
 
   const float gain_n = pessimistic_gain_n(seen);
   const bool rise = may_rise(seen, input.phase);
-  s.recovering_s =
-      seen.jumped || !rise ? 0.0F : std::min(s.recovering_s + config_.period_s, 100.0F);
-  const float rate = s.recovering_s < kAfterJump_s ? kAfterJump_1_s : config_.recovery_1_s;
-  const float kept = rise ? s.feared_n * exp_bounded(-rate * config_.period_s) : s.feared_n;
-  s.feared_n = input.phase == CutPhase::kAir && !seen.resolving ? 0.0F : std::max(gain_n, kept);
+  fear(seen, gain_n, rise, input.phase);
 
   const Forecast ahead = forecast(seen.force_n, gain_n * speed);
   Forecast feared = ahead;
@@ -210,15 +227,7 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   const bool odd =
       input.phase == CutPhase::kCut && s.since_jump_s > kLost_s && seen.innovation < kOdd;
   if (!rise || odd) wanted = std::min(wanted, input.override_applied_pct);
-  if (config_.learns) {
-    wanted = std::max(map_.limit({.reference_n = input.force_reference_n,
-                                  .ahead_s = ahead.path_s,
-                                  .force_n = ahead.force_n,
-                                  .override_pct = wanted,
-                                  .spindle_ratio = input.spindle_ratio,
-                                  .air = input.phase == CutPhase::kAir}),
-                      config_.floor_pct);
-  }
+  if (config_.learns) wanted = within_map(wanted, ahead, input);
   Output out =
       law_answer(input.mode == LawMode::kActive ? as_code(wanted, input.override_applied_pct)
                                                 : input.override_applied_pct);

@@ -124,7 +124,7 @@ class Predictive {
   [[nodiscard]] KnownFeed known_feed(float applied_pct) noexcept;
   [[nodiscard]] Forecast forecast(float force_n, float drive_n) const noexcept;
   [[nodiscard]] float pessimistic_gain_n(const GainTracker::Output& seen) noexcept;
-  [[nodiscard]] Reach reach(const Forecast& ahead, float reference_n) noexcept;
+  [[nodiscard]] Reach reach(const Forecast& ahead, float reference_n) const noexcept;
   [[nodiscard]] float stable_gain_ratio(const Horizon& horizon) const noexcept;
   [[nodiscard]] Reach with_margin(Reach reach, const GainTracker::Output& seen) const noexcept;
   [[nodiscard]] float wanted_pct(const Forecast& ahead, const Horizon& horizon,
@@ -133,8 +133,11 @@ class Predictive {
   void assume_latency(float latency_s) noexcept;
   void find_latency(const Input& input, bool jumped) noexcept;
   [[nodiscard]] float feed_ratio(float w) const noexcept;
+  void fear(const GainTracker::Output& seen, float gain_n, bool rise, CutPhase phase) noexcept;
+  [[nodiscard]] float within_map(float wanted_pct, const Forecast& ahead,
+                                 const Input& input) noexcept;
   void learn(const GainTracker::Output& seen, float feed, CutPhase phase) noexcept;
-  [[nodiscard]] float as_code(float wanted_pct, float sent_pct) noexcept;
+  [[nodiscard]] float as_code(float wanted_pct, float sent_pct) const noexcept;
   [[nodiscard]] bool may_rise(const GainTracker::Output& seen, CutPhase phase) noexcept;
 
   Config config_;

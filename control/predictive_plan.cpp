@@ -67,7 +67,7 @@ float Predictive::pessimistic_gain_n(const GainTracker::Output& seen) noexcept {
 }
 
 // (C87)
-auto Predictive::reach(const Forecast& ahead, float reference_n) noexcept -> Reach {
+auto Predictive::reach(const Forecast& ahead, float reference_n) const noexcept -> Reach {
   const bool recent = state_.since_jump_s < kDeepRetreat_s;
   if (ahead.force_n > kAbove_ratio * reference_n) {
     return recent || ahead.force_n > kFarAbove_ratio * reference_n ? kOneTick : kMiddle;
@@ -110,7 +110,7 @@ float Predictive::wanted_pct(const Forecast& ahead, const Horizon& horizon,
 }
 
 // A code that the CNC has, and not a new one for nothing. (C90)
-float Predictive::as_code(float wanted_pct, float sent_pct) noexcept {
+float Predictive::as_code(float wanted_pct, float sent_pct) const noexcept {
   const auto step = static_cast<float>(config_.step_pct);
   const auto down = [step](float pct) {
     return step * static_cast<float>(static_cast<std::int32_t>(pct / step + 1e-3F));
