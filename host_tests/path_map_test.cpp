@@ -245,6 +245,8 @@ TEST(PathMap, IsNotBelievedForLongWhereItIsWrong) {
   // And the part after it has learned the light one.
   const Score third = score(cut(path, light, 60.0));
   RecordProperty("third_time_ratio", std::to_string(third.time_s / without.time_s));
+  EXPECT_LT(third.time_s, 1.08 * without.time_s);
+  EXPECT_LT(third.peak_n, 1.10 * 500.0);
 }
 
 TEST(PathMap, RefusesEveryConfigThatBreaksARule) {
