@@ -98,8 +98,6 @@ class PathMap {
   void learn(const Lesson& lesson) noexcept;
   // The override that the map allows; the wanted one where it has nothing against it.
   [[nodiscard]] float limit(const Question& question) noexcept;
-  // Nothing is known of any part.
-  void forget() noexcept { state_ = State{}; }
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
   void restore(const State& state) noexcept { state_ = state; }
