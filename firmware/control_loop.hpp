@@ -103,7 +103,9 @@ class ControlLoop {
     estimator::Calibration calibration{};
     estimator::TorquePath::Output path{};
     std::uint32_t has_path = 0;
-    control::LawOutput law{};  // of the last control tick
+    control::LawOutput law{};         // of the last control tick
+    std::uint32_t saturated_low = 0;  // likewise
+    std::uint32_t saturated_high = 0;
     LoopOutput last{};
   };
 

@@ -56,6 +56,8 @@ void ControlLoop::control_tick(LoopOutput& out) noexcept {
               .override_code = controlled.override_code,
               .controlling = controlled.controlling};
   own_.law = controlled.law;
+  own_.saturated_low = controlled.saturated_low ? 1U : 0U;
+  own_.saturated_high = controlled.saturated_high ? 1U : 0U;
   own_.part_start = 0;
   own_.speed_sum_rad_s = 0.0F;
   own_.speed_count = 0;
@@ -68,6 +70,8 @@ void ControlLoop::publish_control(LoopOutput& out) const noexcept {
   if (!config_.control) return;
   out.override_pct = static_cast<float>(command_.override_pct);
   out.present |= LoopOutput::kOverride;
+  out.saturated_low = own_.saturated_low != 0;
+  out.saturated_high = own_.saturated_high != 0;
   if (own_.law.process_gain_n_pct > 0.0F) {
     out.process_gain_n_pct = own_.law.process_gain_n_pct;
     out.process_gain_sigma_ratio = own_.law.process_gain_sigma_ratio;
