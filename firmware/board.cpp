@@ -226,7 +226,7 @@ auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> Boa
 
   BoardOutput out{};
   out.supervision = supervision_;
-  if (!supervision_.silent) out.frame_count = report_.due(now_ns, values(), out.frames);
+  if (!supervision_.silent) out.frame = report_.due(now_ns, values());
   if (!supervision_.alive) {
     own_.alive = 0;
     own_.alive_ns = now_ns;

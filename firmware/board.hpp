@@ -13,12 +13,9 @@
 // The board is a value: a copy continues bit for bit.
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <cstdint>
 #include <expected>
 #include <optional>
-#include <span>
 #include <type_traits>
 
 #include "control/override_code.hpp"
@@ -48,8 +45,7 @@ struct BoardHealth {
 };
 
 struct BoardOutput {
-  std::array<hal::can::Frame, BoardReport::kMost> frames;
-  std::size_t frame_count;
+  std::optional<hal::can::Frame> frame;  // to send; sent() says that it could be handed over
   hal::ByteOutput byte;
   control::Supervisor::Output supervision;
 };
@@ -86,6 +82,9 @@ class Board {
                                                  std::int64_t now_ns) noexcept;
   // After all that has come since the last tick. `now_ns` does not go back.
   [[nodiscard]] BoardOutput tick(std::int64_t now_ns, const BoardHealth& health) noexcept;
+
+  // The frame of the last tick is on its way.
+  void sent() noexcept { report_.sent(); }
 
   [[nodiscard]] const control::Supervisor::Output& supervision() const noexcept {
     return supervision_;

@@ -86,11 +86,8 @@ class BoardCycle {
         ++byte_failures_;
       }
     }
-    if (ports_.can == nullptr) return;
-    for (const hal::can::Frame& frame : std::span(output.frames).first(output.frame_count)) {
-      // What has no room is gone: the port counts it, and the next cycle has a newer one.
-      static_cast<void>(ports_.can->send(frame));
-    }
+    // What has no room is made anew at the next tick, from newer values.
+    if (ports_.can != nullptr && output.frame && ports_.can->send(*output.frame)) board_.sent();
   }
 
   Board& board_;

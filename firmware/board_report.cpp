@@ -49,7 +49,7 @@ std::uint16_t error_code(Reason reason) noexcept {
   return kGenericError;
 }
 
-bool is_fault(std::uint8_t state) noexcept {
+bool is_fault(std::uint32_t state) noexcept {
   switch (static_cast<SupervisorState>(state)) {
     case SupervisorState::kLinkLost:
     case SupervisorState::kProtect:
@@ -80,70 +80,118 @@ std::uint8_t nmt_state(std::uint8_t state) noexcept {
   return testing ? kPreOperational : kOperational;
 }
 
-// Catches up with a schedule without sending twice.
-bool cycle(std::int64_t now_ns, std::int64_t period_ns, bool started,
-           std::int64_t& last_ns) noexcept {
-  if (started && now_ns - last_ns < period_ns) return false;
-  const bool behind = !started || now_ns - last_ns >= 2 * period_ns;
-  last_ns = behind ? now_ns : last_ns + period_ns;
-  return true;
+std::uint32_t bit(BoardReport::Kind kind) noexcept { return 1U << static_cast<unsigned>(kind); }
+
+// Never 0 for a fault: kNone is no state of one.
+std::uint32_t emergency_of(std::uint32_t state, std::uint32_t reason) noexcept {
+  return is_fault(state) ? (state << 8U) + reason + 1U : 0U;
+}
+
+hal::can::Emergency emergency_message(const BoardValues& values) noexcept {
+  if (!is_fault(values.state)) {
+    return {.error_code = 0,
+            .error_register = 0,
+            .state = values.state,
+            .reason = values.reason,
+            .detail = 0};
+  }
+  const std::uint16_t code = error_code(static_cast<Reason>(values.reason));
+  const bool link = code == kHeartbeatError || code == kBusPassive || code == kMonitoring;
+  return {.error_code = code,
+          .error_register = static_cast<std::uint8_t>(
+              link ? kRegisterGeneric | kRegisterCommunication : kRegisterGeneric),
+          .state = values.state,
+          .reason = values.reason,
+          .detail = 0};
+}
+
+// On the schedule's grid, unless it is a whole cycle late.
+std::int64_t next_on_grid(std::int64_t last_ns, std::int64_t now_ns, std::int64_t cycle_ns,
+                          bool started) noexcept {
+  return started && now_ns - last_ns < 2 * cycle_ns ? last_ns + cycle_ns : now_ns;
 }
 
 }  // namespace
 
-bool BoardReport::override_due(std::int64_t now_ns, const BoardValues& values) const noexcept {
-  const std::int64_t since_ns = now_ns - state_.override_ns;
-  const std::uint8_t sent = values.override.override_pct.value_or(0xFF);
-  const bool changed = sent != state_.last_override_pct || values.state != state_.last_state ||
-                       values.reason != state_.last_reason;
-  return state_.started == 0 || since_ns >= kOverrideCycle_ns ||
-         (changed && since_ns >= kOverrideLeastGap_ns);
+bool BoardReport::is_due(Kind kind, std::int64_t now_ns, std::int64_t last_ns,
+                         std::int64_t cycle_ns) const noexcept {
+  return (state_.started & bit(kind)) == 0 || now_ns - last_ns >= cycle_ns;
 }
 
-bool BoardReport::emergency_due(const BoardValues& values, hal::can::Emergency& out) noexcept {
-  const bool fault = is_fault(values.state);
-  const bool changed = values.state != state_.last_state || values.reason != state_.last_reason;
-  if (!fault && state_.emergency == 0) return false;
-  if (fault && state_.emergency != 0 && !changed) return false;
-  const auto code = error_code(static_cast<Reason>(values.reason));
-  const bool link = code == kHeartbeatError || code == kBusPassive || code == kMonitoring;
-  out = {.error_code = fault ? code : std::uint16_t{0},
-         .error_register = static_cast<std::uint8_t>(
-             fault ? kRegisterGeneric | (link ? kRegisterCommunication : 0U) : 0U),
-         .state = values.state,
-         .reason = values.reason,
-         .detail = 0};
-  state_.emergency = fault ? 1 : 0;
-  return true;
+auto BoardReport::most_urgent(std::int64_t now_ns, const BoardValues& values) const noexcept
+    -> Kind {
+  if (emergency_of(values.state, values.reason) != state_.emergency) return Kind::kEmergency;
+  const bool changed = values.override.override_pct.value_or(0xFF) != state_.last_override_pct ||
+                       values.state != state_.last_state || values.reason != state_.last_reason;
+  if (is_due(Kind::kOverride, now_ns, state_.override_ns,
+             changed ? kOverrideLeastGap_ns : kOverrideCycle_ns))
+    return Kind::kOverride;
+  if (is_due(Kind::kHeartbeat, now_ns, state_.heartbeat_ns, kHeartbeatCycle_ns))
+    return Kind::kHeartbeat;
+  if (is_due(Kind::kEstimate, now_ns, state_.estimate_ns, kEstimateCycle_ns))
+    return Kind::kEstimate;
+  if (is_due(Kind::kDiagnostics, now_ns, state_.diagnostics_ns, kDiagnosticsCycle_ns))
+    return Kind::kDiagnostics;
+  return Kind::kNone;
 }
 
-std::size_t BoardReport::due(std::int64_t now_ns, const BoardValues& values,
-                             std::span<hal::can::Frame, kMost> frames) noexcept {
-  std::size_t count = 0;
-  const bool started = state_.started != 0;
-  const bool send_override = override_due(now_ns, values);
-  // What stops a machine goes first.
-  if (hal::can::Emergency emergency{}; send_override && emergency_due(values, emergency)) {
-    frames[count++] = pack(emergency, node_);
+auto BoardReport::due(std::int64_t now_ns, const BoardValues& values) noexcept
+    -> std::optional<hal::can::Frame> {
+  const Kind kind = most_urgent(now_ns, values);
+  state_.offered = static_cast<std::uint32_t>(kind);
+  state_.offered_ns = now_ns;
+  state_.offered_state = values.state;
+  state_.offered_reason = values.reason;
+  state_.offered_override_pct = values.override.override_pct.value_or(0xFF);
+  switch (kind) {
+    case Kind::kNone:
+      break;
+    case Kind::kEmergency:
+      return pack(emergency_message(values), node_);
+    case Kind::kOverride:
+      return pack(values.override, node_, static_cast<std::uint8_t>(state_.counter));
+    case Kind::kHeartbeat:
+      return pack(hal::can::Heartbeat{.nmt_state = nmt_state(values.state)}, node_);
+    case Kind::kEstimate:
+      return pack(values.estimate, node_);
+    case Kind::kDiagnostics:
+      return pack(values.diagnostics, node_);
   }
-  if (send_override) {
-    frames[count++] = pack(values.override, node_, static_cast<std::uint8_t>(state_.counter++));
-    state_.override_ns = now_ns;
-    state_.last_override_pct = values.override.override_pct.value_or(0xFF);
-    state_.last_state = values.state;
-    state_.last_reason = values.reason;
+  return std::nullopt;
+}
+
+void BoardReport::sent() noexcept {
+  const auto kind = static_cast<Kind>(state_.offered);
+  const std::int64_t now_ns = state_.offered_ns;
+  const bool started = (state_.started & bit(kind)) != 0;
+  const auto follow = [&](std::int64_t& last_ns, std::int64_t cycle_ns) {
+    last_ns = next_on_grid(last_ns, now_ns, cycle_ns, started);
+  };
+  switch (kind) {
+    case Kind::kNone:
+      break;
+    case Kind::kEmergency:
+      state_.emergency = emergency_of(state_.offered_state, state_.offered_reason);
+      break;
+    case Kind::kOverride:
+      ++state_.counter;
+      state_.override_ns = now_ns;
+      state_.last_override_pct = state_.offered_override_pct;
+      state_.last_state = state_.offered_state;
+      state_.last_reason = state_.offered_reason;
+      break;
+    case Kind::kHeartbeat:
+      follow(state_.heartbeat_ns, kHeartbeatCycle_ns);
+      break;
+    case Kind::kEstimate:
+      follow(state_.estimate_ns, kEstimateCycle_ns);
+      break;
+    case Kind::kDiagnostics:
+      follow(state_.diagnostics_ns, kDiagnosticsCycle_ns);
+      break;
   }
-  if (cycle(now_ns, kEstimateCycle_ns, started, state_.estimate_ns)) {
-    frames[count++] = pack(values.estimate, node_);
-  }
-  if (cycle(now_ns, kDiagnosticsCycle_ns, started, state_.diagnostics_ns)) {
-    frames[count++] = pack(values.diagnostics, node_);
-  }
-  if (cycle(now_ns, kHeartbeatCycle_ns, started, state_.heartbeat_ns)) {
-    frames[count++] = pack(hal::can::Heartbeat{.nmt_state = nmt_state(values.state)}, node_);
-  }
-  state_.started = 1;
-  return count;
+  state_.started |= bit(kind);
+  state_.offered = 0;
 }
 
 }  // namespace cutforce::firmware
