@@ -36,6 +36,22 @@ void ControlLoop::note_commands(const hal::Sample& sample) noexcept {
   }
 }
 
+void ControlLoop::permit(const control::Permission& permission) noexcept {
+  own_.permitted = permission.enable ? 1U : 0U;
+  own_.may_rise = permission.may_rise ? 1U : 0U;
+  own_.ceiling_pct = permission.ceiling_pct;
+  own_.floor_pct = permission.floor_pct;
+  own_.force_reference_n = permission.force_reference_n;
+}
+
+control::Permission ControlLoop::permission() const noexcept {
+  return {.enable = config_.control && own_.enabled != 0 && own_.permitted != 0,
+          .may_rise = own_.may_rise != 0,
+          .ceiling_pct = own_.ceiling_pct,
+          .floor_pct = own_.floor_pct,
+          .force_reference_n = own_.force_reference_n};
+}
+
 void ControlLoop::control_tick(LoopOutput& out) noexcept {
   const bool valid = own_.force_count > 0 && own_.force_due == 0;
   const float count = own_.force_count > 0 ? static_cast<float>(own_.force_count) : 1.0F;
@@ -49,7 +65,7 @@ void ControlLoop::control_tick(LoopOutput& out) noexcept {
                         .spindle_ratio = spindle_ratio(speed_rad_s, config_.programmed_speed_rad_s),
                         .force_valid = valid,
                         .override_reported = own_.override_reported != 0,
-                        .enable = config_.control && own_.enabled != 0,
+                        .permission = permission(),
                         .part_start = own_.part_start != 0});
   command_ = {.time_ns = own_.time_ns,
               .override_pct = controlled.override_pct,
