@@ -42,7 +42,7 @@ class BoardCycle {
     receive(now_ns, sink);
     health.lost_samples += sample(now_ns, sink);
     health.has_bus = ports_.can != nullptr;
-    if (ports_.can != nullptr) health.bus = ports_.can->status();
+    if (ports_.can != nullptr) health.bus = bus_ = ports_.can->status();
     health.lines = lines_;
     health.output_failed = health.output_failed || byte_failures_ >= kFailuresInRow ||
                            source_failures_ >= kFailuresInRow;
@@ -51,12 +51,22 @@ class BoardCycle {
     return output;
   }
 
+  // How often the bus and the source were served without a refusal, for a watchdog. A port that is
+  // not there is always well; a bus that is down is the supervisor's affair.
+  [[nodiscard]] std::uint64_t bus_passes() const noexcept { return bus_passes_; }
+  [[nodiscard]] std::uint64_t sample_passes() const noexcept { return sample_passes_; }
+  [[nodiscard]] const hal::BusStatus& bus() const noexcept { return bus_; }
+
  private:
   template <class Sink>
   void receive(std::int64_t now_ns, Sink& sink) noexcept {
-    if (ports_.can == nullptr) return;
+    if (ports_.can == nullptr) {
+      ++bus_passes_;
+      return;
+    }
     const auto count = ports_.can->receive(frames_);
     if (!count) return;  // the status says why
+    ++bus_passes_;
     for (const hal::can::Frame& frame : std::span(frames_).first(*count)) {
       if (const auto row = board_.receive(frame, now_ns)) sink(*row);
     }
@@ -64,13 +74,17 @@ class BoardCycle {
 
   template <class Sink>
   std::uint32_t sample(std::int64_t now_ns, Sink& sink) noexcept {
-    if (ports_.source == nullptr) return 0;
+    if (ports_.source == nullptr) {
+      ++sample_passes_;
+      return 0;
+    }
     const auto reading = ports_.source->read(samples_);
     if (!reading) {
       ++source_failures_;
       return 0;
     }
     source_failures_ = 0;
+    ++sample_passes_;
     for (const hal::Sample& sample : std::span(samples_).first(reading->count)) {
       if (const auto row = board_.sample(sample, now_ns)) sink(*row);
     }
@@ -95,6 +109,9 @@ class BoardCycle {
   std::array<hal::can::Frame, kFramesATick> frames_{};
   std::array<hal::Sample, kSamplesATick> samples_{};
   hal::ByteInput lines_{.acknowledged = true, .inhibit = false};
+  hal::BusStatus bus_{};
+  std::uint64_t bus_passes_ = 0;
+  std::uint64_t sample_passes_ = 0;
   std::uint32_t byte_failures_ = 0;
   std::uint32_t source_failures_ = 0;
 };

@@ -113,9 +113,12 @@ void check_lines(TomlSection& gpio, const GpioWiring& wiring) {
     gpio.refuse("data", "a line is there twice", "give each bit a line of its own");
   }
   for (const std::uint32_t line : wiring.active_low) {
-    if (std::ranges::count(used, line) == 0) {
-      gpio.refuse("active_low", "line " + std::to_string(line) + " is not used",
-                  "list lines of [gpio] only");
+    const bool data = std::ranges::count(wiring.data, line) != 0;
+    if (data || std::ranges::count(used, line) == 0) {
+      gpio.refuse("active_low",
+                  "line " + std::to_string(line) + (data ? " is a data line" : " is not used"),
+                  "list strobe, alive, alarm, acknowledge or inhibit; data_active_low = true turns "
+                  "all data lines over");
     }
   }
   if (!wiring.strobe) {
@@ -131,14 +134,15 @@ std::optional<GpioWiring> read_gpio(TomlSection gpio) {
   gpio.require("data", "give the offsets of the data lines, lowest bit first");
   GpioWiring wiring{.chip = text_or(gpio, "chip", ""),
                     .data = read_lines(gpio, "data"),
+                    .data_active_low = gpio.flag("data_active_low").value_or(false),
                     .strobe = read_line(gpio, "strobe"),
                     .alive = read_line(gpio, "alive"),
                     .alarm = read_line(gpio, "alarm"),
                     .acknowledge = read_line(gpio, "acknowledge"),
                     .inhibit = read_line(gpio, "inhibit"),
                     .active_low = read_lines(gpio, "active_low"),
-                    .setup_us = whole_or(gpio, "setup_us", 50, 0, 10000),
-                    .hold_us = whole_or(gpio, "hold_us", 50, 0, 10000)};
+                    .setup_us = whole_or(gpio, "setup_us", 50, 1, 10000),
+                    .hold_us = whole_or(gpio, "hold_us", 50, 1, 10000)};
   check_lines(gpio, wiring);
   return wiring;
 }

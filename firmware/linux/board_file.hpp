@@ -5,7 +5,8 @@
 //   [can]      interface, node
 //   [samples]  source = "can" | "iio", voltage_full_scale_v, current_full_scale_a
 //   [iio]      device, trigger, buffer_samples, voltage, current, speed, power_meter, scales
-//   [gpio]     chip, data, strobe, alive, alarm, acknowledge, inhibit, active_low, times
+//   [gpio]     chip, data, strobe, alive, alarm, acknowledge, inhibit,
+//              data_active_low, active_low, setup_us, hold_us
 //   [watchdog] device, timeout_s
 //   [trace]    folder, every_estimate, file_minutes, keep
 //   [run]      priority, tick_s
@@ -49,12 +50,13 @@ struct IioWiring {
 struct GpioWiring {
   std::string chip;
   std::vector<std::uint32_t> data;  // offsets, lowest bit first; 8, or 4 for fanuc_ov_10
+  bool data_active_low;
   std::optional<std::uint32_t> strobe;
   std::optional<std::uint32_t> alive;
   std::optional<std::uint32_t> alarm;
   std::optional<std::uint32_t> acknowledge;
   std::optional<std::uint32_t> inhibit;
-  std::vector<std::uint32_t> active_low;
+  std::vector<std::uint32_t> active_low;  // of the lines beside the data
   std::uint32_t setup_us;
   std::uint32_t hold_us;
 };
