@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "control/override_code.hpp"
 #include "firmware/configuration_board.hpp"
 #include "firmware/host/machine_file.hpp"
 #include "firmware/host/run/loop_recorder.hpp"
@@ -26,7 +25,6 @@ namespace {
 using hal::host::InputError;
 
 constexpr int kDone = 0;
-constexpr int kFailed = 1;
 constexpr int kBadInput = 2;
 constexpr std::int64_t kHousekeeping_ns = 100'000'000;
 constexpr std::int64_t kNanosecondsInMinute = 60'000'000'000;
@@ -160,9 +158,7 @@ int run_service(const ServiceOptions& options) {
   listen_for_signals();
   auto notifier = hal::os::ServiceNotifier::open();
   if (!notifier) return refuse(notifier.error());
-  const std::uint8_t neutral =
-      control::encode(files->machine.override_code, board->supervision().override_pct);
-  auto ports = open_ports(files->board, files->machine, neutral);
+  auto ports = open_ports(files->board, files->machine, board->byte());
   if (!ports) return refuse(ports.error());
   std::optional<hal::os::Watchdog> watchdog;
   if (const auto& wiring = files->board.watchdog) {

@@ -1,6 +1,6 @@
 // The service: files checked, ports opened, the board made, two threads, and an orderly end.
 //
-// Exit status: 0 it was told to end, 1 it could not go on, 2 the files or the wiring are wrong;
+// Exit status: 0 it was told to end, 2 the files or the wiring are wrong;
 // nothing was armed then, and no line was touched unless every port could be opened.
 #pragma once
 
