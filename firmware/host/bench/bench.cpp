@@ -99,7 +99,7 @@ std::size_t Bench::step(std::span<hal::can::Frame, kMostFrames> frames) noexcept
 }
 
 CncModel::Output Bench::step_cnc(const BenchLathe::Machine& machine) noexcept {
-  const bool by_lines = config_.cnc.lines;
+  const bool by_lines = config_.by_lines;
   const auto& heard = listener_.state().override;
   const bool is_new = by_lines ? std::exchange(lines_.is_new, false) : listener_.fetch_new();
   const auto by_frame = heard ? heard->override_pct : std::nullopt;

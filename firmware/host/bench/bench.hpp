@@ -42,6 +42,7 @@ class Bench {
     bool wait_for_board;
     bool threading;              // the CNC says so throughout
     control::OverrideCode code;  // of the byte
+    bool by_lines;               // override and sign of life come by the lines, not by the bus
   };
 
   // One instant of what is told, shown and written.

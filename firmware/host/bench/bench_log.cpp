@@ -114,7 +114,7 @@ std::vector<Figure> BenchLog::figures(const Bench& bench) const {
       {"override_pct", "Override in effect", count(row.cnc.override_pct), "%"},
       {"armings", "Arming edges given", count(bench.cnc().armings)},
       {"silences", "Silences of the board", count(bench.cnc().silences)}};
-  if (bench.config().cnc.lines) {
+  if (bench.config().by_lines) {
     const auto& lines = bench.lines();
     out.push_back({"bytes", "Bytes strobed", count(lines.bytes)});
     out.push_back({"invalid_bytes", "Bytes that the code does not define", count(lines.invalid)});
@@ -148,13 +148,13 @@ std::vector<Figure> BenchLog::figures(const Bench& bench) const {
 }
 
 bool BenchLog::held(const Bench& bench) const noexcept {
-  if (bench.config().cnc.lines) return bench.lines().alive_edges != 0;
+  if (bench.config().by_lines) return bench.lines().alive_edges != 0;
   if (!bench.heard().override) return false;
   return (!bench.config().cnc.arm || armed_) && (!bench.config().cnc.control || controlled_);
 }
 
 std::string BenchLog::verdict(const Bench& bench) const {
-  const bool lines = bench.config().cnc.lines;
+  const bool lines = bench.config().by_lines;
   if (lines ? bench.lines().alive_edges == 0 : !bench.heard().override) {
     return "The board was not heard.";
   }

@@ -52,13 +52,19 @@ struct LineChoice {
   int alarm;  // -1: there is none
 };
 
+struct CanChoice {
+  std::string interface;
+  std::uint8_t node;
+};
+
 struct BenchPorts {
   template <class Link>
   using Opened = std::expected<std::unique_ptr<Link>, hal::host::InputError>;
 
   // Each may be empty: this program was built without.
-  std::function<Opened<CanLink>(const std::string& interface)> open_can;
+  std::function<Opened<CanLink>(const CanChoice& choice)> open_can;
   std::function<Opened<LineLink>(const LineChoice& lines)> open_lines;
+  bool paced = true;  // false: the board is a call and needs no clock
 };
 
 // A port of hal as a link.

@@ -41,6 +41,7 @@ auto CncModel::step(const Input& input) noexcept -> Output {
 
 void CncModel::watch(const Input& input) noexcept {
   State& s = state_;
+  s.told = s.told || input.board_state;
   if (input.is_new && input.override_pct) {
     s.heard_ns = input.now_ns;
     s.newest_pct = *input.override_pct;
@@ -53,7 +54,7 @@ void CncModel::watch(const Input& input) noexcept {
 void CncModel::fall_back() noexcept {
   State& s = state_;
   ++s.silences;
-  const bool controlled = s.control || config_.lines;
+  const bool controlled = s.control || !s.told;
   s.spent = s.spent || s.arm;
   s.arm = s.control = s.armed = false;
   if (!controlled || config_.on_silence == OnSilence::kProgrammed) {

@@ -42,7 +42,6 @@ class CncModel {
     std::int64_t scan_ns;
     std::int64_t timeout_ns;
     OnSilence on_silence;
-    bool lines;  // the board speaks by lines: whether it has control, nobody tells the CNC
     bool arm;
     bool control;             // after arming
     bool rearm;               // acknowledge and arm anew after a fault
@@ -85,6 +84,7 @@ class CncModel {
     bool arm = false;
     bool control = false;
     bool armed = false;  // the board followed the edge
+    bool told = false;   // the board's state has been heard
     bool spent = false;  // the arming was lost again: another needs the operator
   };
 
