@@ -234,7 +234,7 @@ auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> Boa
     own_.alive ^= 1U;
     own_.alive_ns = now_ns;
   }
-  out.byte = {.byte = control::encode(config_.code, supervision_.override_pct),
+  out.byte = {.byte = byte(),
               .alive = own_.alive != 0,
               .alarm = supervision_.alarm,
               .again = false};

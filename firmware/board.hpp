@@ -89,6 +89,10 @@ class Board {
   [[nodiscard]] const control::Supervisor::Output& supervision() const noexcept {
     return supervision_;
   }
+  // On the lines: the override that goes out, in the CNC's code.
+  [[nodiscard]] std::uint8_t byte() const noexcept {
+    return control::encode(config_.code, supervision_.override_pct);
+  }
   [[nodiscard]] const CncLink::State& cnc() const noexcept { return link_.state(); }
   [[nodiscard]] std::uint32_t lost_samples() const noexcept { return own_.lost_samples; }
   // Of the samples, as they come by the clock; 0 before it is known.

@@ -1,8 +1,10 @@
 #include "firmware/linux/control_thread.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "firmware/board_cycle.hpp"
+#include "hal/linux/allocation_count.hpp"
 #include "hal/linux/monotonic_clock.hpp"
 #include "hal/linux/periodic_timer.hpp"
 #include "hal/linux/real_time.hpp"
@@ -23,6 +25,15 @@ void store(std::atomic<T>& shared, T value) noexcept {
   shared.store(value, std::memory_order_relaxed);
 }
 
+struct ThreadCounts {
+  std::uint64_t page_faults;
+  std::uint64_t allocations;
+};
+ThreadCounts thread_counts() noexcept {
+  const hal::os::PageFaults faults = hal::os::page_faults();
+  return {.page_faults = faults.minor + faults.major, .allocations = hal::os::allocation_count()};
+}
+
 // What has happened since the board was armed for the first time.
 class ArmedCount {
  public:
@@ -30,7 +41,7 @@ class ArmedCount {
 
   void tick(const BoardOutput& output, std::uint32_t missed) noexcept {
     if (!armed_ && output.supervision.state < control::SupervisorState::kMonitor) return;
-    const hal::os::ThreadCounts now = hal::os::thread_counts();
+    const ThreadCounts now = thread_counts();
     if (!armed_) {
       armed_ = true;
       before_ = now;
@@ -45,7 +56,7 @@ class ArmedCount {
 
  private:
   Shared& shared_;
-  hal::os::ThreadCounts before_{};
+  ThreadCounts before_{};
   std::uint64_t ticks_ = 0;
   std::uint64_t missed_ = 0;
   bool armed_ = false;
@@ -69,14 +80,27 @@ std::vector<std::string> ControlThread::warnings() const {
   return warned_.load(std::memory_order_acquire) ? warnings_ : std::vector<std::string>{};
 }
 
+// Each refusal is a sentence for a person, and no reason not to run.
+std::optional<hal::os::WakeupLatency> ControlThread::prepare() {
+  const auto note = [this](const auto& result) {
+    if (!result) warnings_.push_back(result.error().text());
+  };
+  note(hal::os::lock_memory());
+  hal::os::prefault_stack();
+  note(hal::os::run_in_real_time(settings_.priority));
+  auto latency = hal::os::WakeupLatency::limit(0);
+  note(latency);
+  return latency ? std::optional{std::move(*latency)} : std::nullopt;
+}
+
 void ControlThread::run() {
-  warnings_ = hal::os::enter_real_time({.priority = settings_.priority});
+  const auto latency = prepare();
   warned_.store(true, std::memory_order_release);
 
   Cycle cycle(board_, {.can = &ports_.can,
                        .bytes = ports_.bytes ? &*ports_.bytes : nullptr,
                        .source = ports_.source ? &*ports_.source : nullptr});
-  hal::os::PeriodicTimer timer(settings_.tick_ns);
+  auto timer = hal::os::PeriodicTimer::start(settings_.tick_ns).value();
   ArmedCount armed(shared_);
   const auto keep = [this](const LoopOutput& row) { shared_.rows.push(row); };
   BoardHealth health{};
@@ -84,7 +108,7 @@ void ControlThread::run() {
   std::uint64_t missed = 0;
   std::uint64_t farewell = 0;
   for (std::uint64_t tick = 1; farewell < kFarewellTicks; ++tick) {
-    health.missed_ticks = timer.wait();
+    health.missed_ticks = timer.wait().missed;
     missed += health.missed_ticks;
     health.stop = shared_.stop.load(std::memory_order_relaxed) ||
                   (settings_.ticks != 0 && tick > settings_.ticks);

@@ -4,7 +4,9 @@
 // refused: the words about it are for a person.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -12,6 +14,7 @@
 #include "firmware/board.hpp"
 #include "firmware/linux/ports.hpp"
 #include "firmware/linux/shared.hpp"
+#include "hal/linux/real_time.hpp"
 
 namespace cutforce::firmware::board {
 
@@ -38,6 +41,7 @@ class ControlThread {
 
  private:
   void run();
+  [[nodiscard]] std::optional<hal::os::WakeupLatency> prepare();
 
   Board& board_;
   Ports& ports_;

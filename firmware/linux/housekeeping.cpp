@@ -7,16 +7,18 @@
 namespace cutforce::firmware::board {
 
 Housekeeping::Housekeeping(Shared& shared, Ports& ports, TraceFolder& traces,
-                           std::optional<hal::os::Watchdog> watchdog, Say say)
+                           std::optional<hal::os::Watchdog> watchdog,
+                           hal::os::ServiceNotifier notifier, Say say)
     : shared_(shared),
       ports_(ports),
       traces_(traces),
       watchdog_(std::move(watchdog)),
+      notifier_(std::move(notifier)),
       say_(std::move(say)) {}
 
 void Housekeeping::run(std::int64_t now_ns) {
   drain();
-  feed(now_ns);
+  feed();
   restart_bus(now_ns);
 }
 
@@ -28,17 +30,17 @@ void Housekeeping::drain() {
 }
 
 void Housekeeping::tell(const StateChange& change) {
-  std::string text(control::name_of(change.state));
+  const auto& reason = control::kReasonTexts[static_cast<std::size_t>(change.reason)];
+  std::string text(control::kStateTexts[static_cast<std::size_t>(change.state)].name);
   text += ", override " + std::to_string(change.override_pct) + " %";
   if (change.reason != control::Reason::kNone) {
-    text += ": " + std::string(control::name_of(change.reason)) + "; " +
-            std::string(control::remedy(change.reason));
+    text += ". " + std::string(reason.sentence) + " " + std::string(reason.remedy);
   }
   say_(text);
-  notifier_.status(text);
+  static_cast<void>(notifier_.status(text));  // nobody to tell it to
 }
 
-void Housekeeping::feed(std::int64_t) {
+void Housekeeping::feed() {
   const Progress now{.ticks = shared_.ticks.load(std::memory_order_relaxed),
                      .bus = shared_.bus_passes.load(std::memory_order_relaxed),
                      .samples = shared_.sample_passes.load(std::memory_order_relaxed)};
@@ -55,9 +57,11 @@ void Housekeeping::feed(std::int64_t) {
   }
   starving_ = false;
   fed_ = now;
-  if (watchdog_) watchdog_->feed();
-  if (!std::exchange(ready_, true)) notifier_.ready();
-  notifier_.feed();
+  if (watchdog_ && !watchdog_->feed() && !std::exchange(watchdog_refused_, true)) {
+    say_("the watchdog does not take its food: the machine will be reset");
+  }
+  if (!ready_) ready_ = notifier_.ready().has_value();
+  static_cast<void>(notifier_.alive());  // told again the next time
 }
 
 void Housekeeping::restart_bus(std::int64_t now_ns) {
@@ -76,10 +80,10 @@ void Housekeeping::restart_bus(std::int64_t now_ns) {
 }
 
 void Housekeeping::finish() {
-  notifier_.stopping();
+  static_cast<void>(notifier_.stopping());
   drain();
   traces_.close();
-  if (watchdog_) watchdog_->close();
+  if (watchdog_ && !watchdog_->stop()) say_("the watchdog cannot be stopped");
 }
 
 }  // namespace cutforce::firmware::board

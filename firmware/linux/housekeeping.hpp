@@ -25,7 +25,8 @@ class Housekeeping {
   using Say = std::function<void(const std::string&)>;
 
   Housekeeping(Shared& shared, Ports& ports, TraceFolder& traces,
-               std::optional<hal::os::Watchdog> watchdog, Say say);
+               std::optional<hal::os::Watchdog> watchdog, hal::os::ServiceNotifier notifier,
+               Say say);
 
   // Once; to be called some ten times a second.
   void run(std::int64_t now_ns);
@@ -40,7 +41,7 @@ class Housekeeping {
   };
 
   void drain();
-  void feed(std::int64_t now_ns);
+  void feed();
   void restart_bus(std::int64_t now_ns);
   void tell(const StateChange& change);
 
@@ -55,6 +56,7 @@ class Housekeeping {
   bool ready_ = false;
   bool complained_ = false;  // of a restart that failed
   bool starving_ = false;
+  bool watchdog_refused_ = false;
 };
 
 }  // namespace cutforce::firmware::board
