@@ -14,6 +14,7 @@ using hal::host::kTwoPi;
 
 constexpr double kAtSpeed_ratio = 0.95;
 constexpr double kPartStart_s = 0.2;  // how long the CNC says so
+constexpr double kRest_m_s = 1e-6;    // a slower feed is a feed hold
 
 float range_of(const std::array<hal::host::ChannelConfig, 3>& channels, double otherwise) noexcept {
   const double range = std::max(channels[0].range, channels[1].range);
@@ -99,7 +100,7 @@ void BenchLathe::note_machine() noexcept {
   const double time_s = static_cast<double>(truth.time_ns) * 1e-9;
   const double programmed_m_s = feed.feed_m_rev > 0.0 ? feed.feed_m_rev * turns_s : feed.feed_m_s;
   known_ = {.spindle_at_speed = std::abs(truth.speed_rad_s) >= kAtSpeed_ratio * speed_rad_s_,
-            .cutting_feed = sample_.feed_active > 0.5F,
+            .cutting_feed = sample_.feed_active > 0.5F && truth.feed_m_s > kRest_m_s,
             .part_start = time_s >= feed.start_s && time_s < feed.start_s + kPartStart_s,
             .override_applied_pct =
                 static_cast<std::uint8_t>(std::clamp(std::round(truth.override_pct), 0.0, 254.0)),

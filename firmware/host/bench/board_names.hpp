@@ -1,31 +1,19 @@
-// What the numbers in the board's frames are called, for a person at the CNC.
+// What the numbers in the board's frames are called; a frame may say what this program does not
+// know yet.
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
-#include "control/supervisor.hpp"
+#include "control/supervisor_text.hpp"
 
 namespace cutforce::firmware::host {
 
-inline constexpr std::array<std::string_view, control::kSupervisorStateCount> kBoardStateNames{
-    "boot", "self_test", "check",   "ready", "monitor", "control",
-    "hold", "link_lost", "protect", "safe",  "dead"};
-
-inline constexpr std::array<std::string_view, control::kReasonCount> kReasonNames{
-    "none",        "self_test_failed", "check_failed",  "link_timeout",
-    "bus_down",    "samples_missing",  "estimate_lost", "signal_fault",
-    "force_limit", "inhibited",        "threading",     "spindle",
-    "overrun",     "output",           "foreign",       "stopped"};
-
-// A frame may say what this program does not know yet.
 [[nodiscard]] constexpr std::string_view board_state_name(std::uint8_t state) noexcept {
-  return state < kBoardStateNames.size() ? kBoardStateNames[state] : "unknown";
+  return state < control::kStateTexts.size() ? control::kStateTexts[state].name : "unknown";
 }
 [[nodiscard]] constexpr std::string_view reason_name(std::uint8_t reason) noexcept {
-  return reason < kReasonNames.size() ? kReasonNames[reason] : "unknown";
+  return reason < control::kReasonTexts.size() ? control::kReasonTexts[reason].name : "unknown";
 }
 
 }  // namespace cutforce::firmware::host

@@ -32,11 +32,14 @@ auto CncModel::step(const Input& input) noexcept -> Output {
   if (s.cnc == CncState::kFollowing && input.now_ns % config_.scan_ns == 0) {
     s.override_pct = s.newest_pct;
   }
+  // A lost link is acknowledged by the arm switch, everything else by the reset button.
+  const bool button = input.now_ns < s.button_until_ns;
+  const bool link_lost = is(input, Board::kLinkLost);
   return {.state = s.cnc,
           .override_pct = static_cast<std::uint8_t>(s.override_pct),
-          .arm = s.arm,
+          .arm = s.arm || (button && link_lost),
           .control = s.control,
-          .reset = input.now_ns < s.reset_until_ns};
+          .reset = button && !link_lost};
 }
 
 void CncModel::watch(const Input& input) noexcept {
@@ -79,20 +82,20 @@ void CncModel::operate(const Input& input) noexcept {
   }
   const bool speaks = input.now_ns - s.heard_ns <= config_.timeout_ns;
   acknowledge(input, (is_silent(s.cnc) || faulty) && speaks);
-  if (s.cnc == CncState::kFollowing && input.now_ns >= s.reset_until_ns) arm(input);
+  if (s.cnc == CncState::kFollowing && input.now_ns >= s.rest_until_ns) arm(input);
 }
 
 void CncModel::acknowledge(const Input& input, bool fault) noexcept {
   State& s = state_;
-  if (!fault || !config_.rearm || input.now_ns < s.reset_until_ns) {
+  if (!fault || !config_.rearm || input.now_ns < s.rest_until_ns) {
     s.fault_ns = -1;
     return;
   }
   if (s.fault_ns < 0) s.fault_ns = input.now_ns;
   if (input.now_ns - s.fault_ns < kOperator_ns) return;
   s.fault_ns = -1;
-  s.reset_until_ns = input.now_ns + kReset_ns;
-  s.spent = false;
+  s.button_until_ns = input.now_ns + kButton_ns;
+  s.rest_until_ns = s.button_until_ns + kButton_ns;
   s.cnc = CncState::kFollowing;
 }
 
@@ -106,10 +109,17 @@ void CncModel::arm(const Input& input) noexcept {
     return;
   }
   s.armed = s.armed || follows(input);
-  if (config_.control && !s.control && is(input, Board::kMonitor) && input.spindle_at_speed &&
-      input.now_ns >= config_.control_ns) {
-    s.control = true;
-  }
+  give_control(input);
+}
+
+// A board that does not take control was not fit for it at the edge: another edge, a little later.
+void CncModel::give_control(const Input& input) noexcept {
+  State& s = state_;
+  if (!config_.control || !is(input, Board::kMonitor) || input.now_ns < config_.control_ns) return;
+  if (input.now_ns - s.control_ns < kAgain_ns && s.control_ns > 0) return;
+  if (!s.control && !input.spindle_at_speed) return;
+  s.control = !s.control;
+  s.control_ns = input.now_ns;
 }
 
 std::string_view cnc_text(CncState state) noexcept {

@@ -75,7 +75,9 @@ class CncModel {
   struct State {
     std::int64_t heard_ns = 0;   // when the board was last new
     std::int64_t fault_ns = -1;  // since when a fault is seen that the operator may acknowledge
-    std::int64_t reset_until_ns = -1;
+    std::int64_t button_until_ns = -1;  // until when the operator holds one
+    std::int64_t rest_until_ns = -1;    // until when all switches are down after that
+    std::int64_t control_ns = 0;        // when the control switch last moved
     std::uint32_t silences = 0;
     std::uint32_t armings = 0;
     std::uint32_t override_pct = 100;
@@ -89,7 +91,8 @@ class CncModel {
   };
 
   static constexpr std::int64_t kOperator_ns = 1'000'000'000;  // until somebody acknowledges
-  static constexpr std::int64_t kReset_ns = 200'000'000;       // how long the button is held
+  static constexpr std::int64_t kButton_ns = 200'000'000;      // how long a button is held
+  static constexpr std::int64_t kAgain_ns = 500'000'000;       // between tries to give control
 
   [[nodiscard]] static std::expected<CncModel, ConfigError> make(const Config& config) noexcept;
   [[nodiscard]] Output step(const Input& input) noexcept;
@@ -105,6 +108,7 @@ class CncModel {
   void operate(const Input& input) noexcept;
   void acknowledge(const Input& input, bool fault) noexcept;
   void arm(const Input& input) noexcept;
+  void give_control(const Input& input) noexcept;
 
   Config config_;
   State state_{};
