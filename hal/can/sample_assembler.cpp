@@ -60,12 +60,12 @@ std::optional<Sample> SampleAssembler::take(const Phases& phases,
 }
 
 void SampleAssembler::take(const Spindle& spindle) noexcept {
-  state_.spindle_count = spindle.count;
   state_.spindle_present = 1;
+  state_.spindle_count = spindle.count;
+  state_.spindle_signals = (spindle.speed_rad_s ? bit(Signal::kSpeed) : 0U) |
+                           (spindle.power_meter_w ? bit(Signal::kPowerMeter) : 0U);
   state_.speed_rad_s = spindle.speed_rad_s.value_or(0.0F);
-  state_.speed_present = spindle.speed_rad_s ? 1 : 0;
   state_.power_meter_w = spindle.power_meter_w.value_or(0.0F);
-  state_.meter_present = spindle.power_meter_w ? 1 : 0;
 }
 
 void SampleAssembler::put_phases(const Phases& phases, Sample& sample) const noexcept {
@@ -87,14 +87,9 @@ void SampleAssembler::put_spindle(std::uint8_t count, Sample& sample) noexcept {
   if (age >= kCounts / 2) return;  // of a sample that is still to come
   state_.spindle_present = 0;
   if (age > 1) return;
-  if (state_.speed_present != 0) {
-    sample.speed_rad_s = state_.speed_rad_s;
-    sample.present |= bit(Signal::kSpeed);
-  }
-  if (state_.meter_present != 0) {
-    sample.power_meter_w = state_.power_meter_w;
-    sample.present |= bit(Signal::kPowerMeter);
-  }
+  sample.speed_rad_s = state_.speed_rad_s;
+  sample.power_meter_w = state_.power_meter_w;
+  sample.present |= state_.spindle_signals;
 }
 
 }  // namespace cutforce::hal::can

@@ -13,7 +13,8 @@
 //
 // Time never goes back. When the node starts anew its count jumps to 0: seen over a silence of more
 // than 128 samples that is a gap of about the right length; seen at once, either a gap of up to 128
-// samples, or up to 128 samples are dropped as late until the count has caught up.
+// samples, or up to 128 samples are dropped as late until the count has caught up. Where it happens
+// to go on by one within 200 samples, no gap is seen.
 //
 // A Spindle frame goes with the Phases frame of the same count, which the node sends after it; one
 // that comes late goes with the next sample, and one that is older than that with none, nor one
@@ -56,14 +57,13 @@ class SampleAssembler {
     std::int64_t count = 0;        // of the last sample, unwrapped
     std::int64_t expected_ns = 0;  // receipt of the last sample, smoothed
     std::uint32_t started = 0;
-    std::uint32_t lost = 0;      // samples missing in the count, since the start
-    std::uint32_t repeated = 0;  // samples that came twice, or late, and were dropped
+    std::uint32_t lost = 0;             // samples missing in the count, since the start
+    std::uint32_t repeated = 0;         // samples that came twice, or late, and were dropped
+    std::uint32_t spindle_present = 0;  // 1: a Spindle frame waits for its sample
     std::uint32_t spindle_count = 0;
-    std::uint32_t spindle_present = 0;
+    std::uint32_t spindle_signals = 0;  // bit(Signal) of each value that it has
     float speed_rad_s = 0.0F;
     float power_meter_w = 0.0F;
-    std::uint32_t speed_present = 0;
-    std::uint32_t meter_present = 0;
   };
 
   // Fails iff check() does.
