@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "firmware/host/bench/bench_ports.hpp"
 #include "hal/host/input_error.hpp"
 
 namespace CLI {
@@ -35,9 +36,11 @@ void add_reproduce(CLI::App& program, Action& action);
 void add_convert(CLI::App& program, Action& action);
 void add_tune(CLI::App& program, Action& action);
 void add_compare(CLI::App& program, Action& action);
+void add_cnc(CLI::App& program, Action& action, const BenchPorts& ports);
 
-// The whole program. Exit status as Exit; 128 + n where signal n ended it.
-[[nodiscard]] int run_program(int argc, const char* const* argv);
+// The whole program. Exit status as Exit; 128 + n where signal n ended it. `ports`: what `cnc` may
+// open; a composition root that knows an operating system's ports gives them.
+[[nodiscard]] int run_program(int argc, const char* const* argv, const BenchPorts& ports = {});
 
 // To standard error, each with its remedy.
 void show_errors(std::span<const hal::host::InputError> errors);
