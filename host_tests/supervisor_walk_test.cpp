@@ -373,7 +373,7 @@ TEST(SupervisorWalk, KeepsItsRulesInLongRandomRunsAndContinuesFromASnapshot) {
     auto resumed = supervisor;
     Wanderer wanderer(seed);
     const auto allocations = host_tests::allocation_count();
-    for (int i = 0; i < 1'000'000; ++i) {
+    for (int i = 0; i < 250'000; ++i) {
       const S before = supervisor.state().state;
       const int before_pct = supervisor.state().override_pct;
       const Reason reason = supervisor.state().reason;
