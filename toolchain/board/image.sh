@@ -21,13 +21,15 @@ fi
 toolchain/board/fetch.sh > /dev/null
 folder=build/board/image
 rm -rf "$folder"
-mkdir -p "$folder"/{root/data/cutforce,input}
+# An empty data partition: mke2fs would copy the change times of files, which nobody can set.
+mkdir -p "$folder/root/data"
 /usr/bin/python3 toolchain/board/image.py "$service" "$machine_file" "$folder"
 
 # One time and one identifier for everything that would take today's, or a random one.
-export SOURCE_DATE_EPOCH=315532800 E2FSPROGS_FAKE_TIME=315532800 TZ=UTC  # 1980: FAT has no earlier
+time=315532800  # 1980: FAT has no earlier
+export SOURCE_DATE_EPOCH=$time E2FSPROGS_FAKE_TIME=$time E2FSCK_TIME=$time TZ=UTC
 id() { echo "c07f0fce-0000-4000-8000-0000000000$1"; }
-find "$folder/esp" "$folder/root" -exec touch --no-dereference --date=@"$SOURCE_DATE_EPOCH" {} +
+find "$folder/esp" "$folder/root" -exec touch --no-dereference --date="@$time" {} +
 cat > "$folder/genimage.cfg" << END
 image esp.vfat {
   vfat {
@@ -69,7 +71,7 @@ if ! genimage --config "$folder/genimage.cfg" --rootpath "$folder/root" --tmppat
   exit 1
 fi
 mv "$folder/out/cutforce.img" "$folder/cutforce.img"
-rm -r "$folder"/{root,input,tmp,out,esp}
+rm -r "$folder"/{root,tmp,out,esp}
 echo "disk image: $PWD/$folder/cutforce.img"
 du --bytes "$folder/cutforce.img" | awk '{ print "disk image: " $1 " bytes" }'
 sha256sum "$folder/cutforce.img"
