@@ -256,8 +256,12 @@ TEST(Bench, RefusesWhatCannotBe) {
   config = bench_config();
   config.cnc.timeout_ns = 5'000'000;
   EXPECT_EQ(Bench::make(config, std::nullopt).error().where, "--timeout");
-  const auto force = firmware::host::parse_scenario("model = \"force\"\n", "quick").value();
-  EXPECT_FALSE(BenchLathe::make(force, 1, 1));
+  auto scenario = committed_scenario("bench_lathe");
+  scenario.simulation.sample_rate_hz = 3000.0;
+  EXPECT_NE(BenchLathe::make(scenario, 1, 1).error().where.find("sample_rate_hz"),
+            std::string::npos);
+  scenario.model = firmware::host::Model::kForce;
+  EXPECT_NE(BenchLathe::make(scenario, 1, 1).error().what.find("motor"), std::string::npos);
 }
 
 }  // namespace

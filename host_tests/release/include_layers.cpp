@@ -71,7 +71,7 @@ struct Layer {
   enum { kNever, kSourcesOnly, kAlways } eigen;
   enum { kNoLibraries, kLibraries } libraries;
   enum { kNoSystem, kFileCalls, kSystemSources } system;
-  std::array<std::string_view, 4> below;  // starts of project headers
+  std::array<std::string_view, 8> below;  // starts of project headers
 };
 
 // The longest folder that a path starts with decides.
@@ -114,7 +114,7 @@ constexpr auto kLayers = std::to_array<Layer>({
      Layer::kNever,
      Layer::kLibraries,
      Layer::kFileCalls,
-     {"estimator/", "control/", "hal/port.hpp", "hal/host/"}},
+     {"estimator/", "control/", "hal/port.hpp", "hal/can/", "hal/can_port.hpp", "hal/host/"}},
     {"firmware/linux/",
      Layer::kAllStandard,
      Layer::kNever,
