@@ -20,6 +20,18 @@ bool is_down(hal::BusState state) noexcept {
   return state == hal::BusState::kOff || state == hal::BusState::kDown;
 }
 
+// Two voltages of three sum to minus the third: exactly between the lines, and to the neutral of a
+// motor with three wires but for what drives no current.
+hal::Sample with_third_phase(hal::Sample sample) noexcept {
+  using hal::Signal;
+  if (!sample.has(Signal::kVoltageW) && sample.has(Signal::kVoltageU) &&
+      sample.has(Signal::kVoltageV)) {
+    sample.voltage_v[2] = -(sample.voltage_v[0] + sample.voltage_v[1]);
+    sample.present |= hal::bit(Signal::kVoltageW);
+  }
+  return sample;
+}
+
 }  // namespace
 
 Board::Board(const Config& config) noexcept
@@ -66,7 +78,7 @@ auto Board::receive(const hal::can::Frame& frame, std::int64_t now_ns) noexcept
 
 auto Board::sample(const hal::Sample& sample, std::int64_t now_ns) noexcept
     -> std::optional<LoopOutput> {
-  return run_loop(sample, now_ns);
+  return run_loop(with_third_phase(sample), now_ns);
 }
 
 auto Board::run_loop(hal::Sample sample, std::int64_t now_ns) noexcept
@@ -168,7 +180,8 @@ control::Permission Board::permission() const noexcept {
 void Board::supervise(const LoopOutput* output) noexcept {
   const CncLink::State& cnc = link_.state();
   const hal::can::MachineState said = cnc.machine.value_or(hal::can::MachineState{});
-  const bool has_force = output != nullptr && (output->present & LoopOutput::kCuttingForce) != 0;
+  const bool has_force =
+      output != nullptr && !output->doubtful && (output->present & LoopOutput::kCuttingForce) != 0;
   if (output != nullptr) own_.signals_refused = output->state == LoopState::kRefused ? 1U : 0U;
   supervision_ =
       supervisor_.step({.self_test_done = own_.health.self_test_done,
@@ -234,10 +247,8 @@ auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> Boa
     own_.alive ^= 1U;
     own_.alive_ns = now_ns;
   }
-  out.byte = {.byte = byte(),
-              .alive = own_.alive != 0,
-              .alarm = supervision_.alarm,
-              .again = false};
+  out.byte = {
+      .byte = byte(), .alive = own_.alive != 0, .alarm = supervision_.alarm, .again = false};
   return out;
 }
 

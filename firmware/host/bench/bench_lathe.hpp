@@ -2,10 +2,13 @@
 // signals go to the board. Full scale is the sensor's range; where the scenario gives none, twice
 // the rated peak. The third of voltages and currents is not sent, it is minus the sum of the two.
 //
-// Speed and power meter go with every n-th sample. n = 2 is the default, measured with the fused
-// estimator at 1 kHz on the default lathe, mean of 5 seeds, torque rms in percent of rated and lag:
-//   n = 1  0.67 %, 5 ms    2  0.63 %, 8 ms    5  0.88 %, 10 ms    10  3.1 %, 13 ms    20  8.3 %
-// On a bus of 500 kbit/s n = 1 costs 51 % of the time, n = 2 38 %, n = 5 30 %, all frames together.
+// Speed and power meter go with every n-th sample. n = 1 is the default: measured with the fused
+// estimator at 1 kHz on the default lathe, mean of 5 seeds, torque rms in percent of rated, lag of
+// the torque, and share of the time within two of its own sigma:
+//   n = 1   0.67 %   5 ms  99.8 %      n = 5    0.88 %  10 ms  99.7 %
+//   n = 2   0.63 %   8 ms  98.0 %      n = 10   3.1 %   13 ms  94.7 %      n = 20   8.3 %  95 ms
+// so more than 5 must not be. Of a bus of 500 kbit/s all frames together take, at the bit-stuffing
+// worst of 135 bits a frame, 58 % for n = 1, 44 % for n = 2, 36 % for n = 5.
 #pragma once
 
 #include <array>
@@ -19,7 +22,7 @@
 
 namespace cutforce::firmware::host {
 
-inline constexpr std::uint32_t kSpeedEvery = 2;
+inline constexpr std::uint32_t kSpeedEvery = 1;
 
 struct FullScale {
   float voltage_v;
