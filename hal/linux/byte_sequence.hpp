@@ -73,18 +73,29 @@ class ByteSequence {
  private:
   std::expected<void, PortError> strobe(std::uint8_t byte) noexcept {
     strobed_ = false;  // until it is done: a byte that got stuck half way is written again
+    if (strobe_up_) {  // and needs an edge of its own
+      if (const auto set = strobe_down(); !set) return set;
+      wait_(timing_.hold_ns);
+    }
     if (const auto set = lines_.set_data(byte); !set) return set;
     wait_(timing_.setup_ns);
     seen_inactive_ = false;
     acknowledged_ = !timing_.has_acknowledge;
     if (const auto seen = look_for_acknowledge(); !seen) return seen;
+    strobe_up_ = true;
     if (const auto set = lines_.set_strobe(true); !set) return set;
     wait_(timing_.hold_ns);
     const auto seen = look_for_acknowledge();
-    if (const auto set = lines_.set_strobe(false); !set) return set;
+    if (const auto set = strobe_down(); !set) return set;
     if (!seen) return seen;
     byte_ = byte;
     strobed_ = true;
+    return {};
+  }
+
+  std::expected<void, PortError> strobe_down() noexcept {
+    if (const auto set = lines_.set_strobe(false); !set) return set;
+    strobe_up_ = false;
     return {};
   }
 
@@ -105,6 +116,7 @@ class ByteSequence {
   ByteTiming timing_;
   std::uint8_t byte_ = 0;
   bool strobed_ = false;
+  bool strobe_up_ = false;    // or may be
   bool acknowledged_ = true;  // of the last strobe; before the first nothing is owed
   bool seen_inactive_ = false;
 };
