@@ -47,6 +47,18 @@ TEST(CanSendGate, DoesNotLockUpWhenAnEchoIsLost) {
   EXPECT_TRUE(gate.open(CanSendGate::kPatienceNs, true));
 }
 
+TEST(CanSendGate, KnowsAnAdapterThatTakesNothingMore) {
+  CanSendGate gate;
+  gate.sent(frame_of(1), 0);
+  EXPECT_TRUE(gate.heard_back(frame_of(1)));  // by the kernel, at once
+  EXPECT_FALSE(gate.open(10 * kMs, false));
+  EXPECT_FALSE(gate.open(209 * kMs, false));
+  EXPECT_FALSE(gate.unacknowledged(209 * kMs));
+  EXPECT_TRUE(gate.unacknowledged(210 * kMs));
+  EXPECT_TRUE(gate.open(220 * kMs, true));
+  EXPECT_FALSE(gate.unacknowledged(220 * kMs));
+}
+
 TEST(CanSendGate, StaysClosedForEverOnABusWithoutAReceiver) {
   CanSendGate gate;
   gate.sent(frame_of(1), 0);
