@@ -18,6 +18,7 @@ skip() {
 
 fetch() {
   local mirror
+  # shellcheck disable=SC2016  # apt replaces $(REPO_URI)
   mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' |
     grep -m 1 '/debian/*$') || skip "this machine has no Debian mirror"
   cat > "$root/sources.d/$suite.sources" << EOF
