@@ -76,6 +76,7 @@ def file_system(service, machine_file):
             content.add_link(f"/bin/{applet}", "busybox")
     content.add_link("/init", "bin/busybox")
     content.add_link("/tmp", "run")
+    content.add_link("/sbin/modprobe", "../bin/busybox")  # where the kernel itself looks for it
     content.add_program("/sbin/ip", BOARD / "guest/bin/ip")
     content.add_file("/sbin/e2fsck", BOARD / "uefi/sbin/e2fsck.static")
     for tool in ("candump", "cansend", "gpiodetect", "gpioinfo", "gpioget"):
