@@ -124,7 +124,7 @@ template <class Open, class What>
 auto opened(const Open& open, const What& what, const std::string& option) -> decltype(open(what)) {
   if (open) return open(what);
   return std::unexpected{InputError{
-      option, "this program was built without ports to the world",
+      option, "this program was built without such a port",
       "use the cutforce of a Linux build (README.md); here the bench runs in tests alone"}};
 }
 
