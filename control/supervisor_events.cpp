@@ -1,6 +1,5 @@
 // The events of one step, from levels and times.
 #include <algorithm>
-#include <bit>
 
 #include "control/supervisor.hpp"
 #include "control/supervisor_table.hpp"
@@ -75,11 +74,11 @@ bool Supervisor::safe_clear(const Input& input) const noexcept {
 
 std::uint32_t Supervisor::faults(const Input& input) const noexcept {
   const bool linked = config_.link_required;
+  const std::uint32_t over = state_.forces_over;  // more than one bit of it
   const bool late = linked && state_.link_age > link_steps_;
   const bool down = linked && input.bus_down;
   return when(input.stop, kStop) | when(input.output_failed, kOutputFailed) |
-         when(input.foreign, kForeignNode) |
-         when(std::popcount(state_.forces_over) >= 2, kForceOver) |
+         when(input.foreign, kForeignNode) | when((over & (over - 1U)) != 0, kForceOver) |
          when(state_.controlled != 0, kControlled) |
          when(state_.sample_age > samples_steps_, kSamplesGone) |
          when(input.signals_refused, kSignalsRefused) |

@@ -16,8 +16,16 @@ constexpr float kRateTolerance_ratio = 0.1F;
 constexpr float kTurning_rad_s = 1.0F;         // slower is standing still, and noise
 constexpr std::int64_t kMostClockSteps = 100;  // after a stall; the rest of the time is forgotten
 
-bool is_down(hal::BusState state) noexcept {
-  return state == hal::BusState::kOff || state == hal::BusState::kDown;
+// Two voltages of three sum to minus the third: exactly between the lines, and to the neutral of a
+// motor with three wires but for what drives no current.
+hal::Sample with_third_phase(hal::Sample sample) noexcept {
+  using hal::Signal;
+  if (!sample.has(Signal::kVoltageW) && sample.has(Signal::kVoltageU) &&
+      sample.has(Signal::kVoltageV)) {
+    sample.voltage_v[2] = -(sample.voltage_v[0] + sample.voltage_v[1]);
+    sample.present |= hal::bit(Signal::kVoltageW);
+  }
+  return sample;
 }
 
 }  // namespace
@@ -66,7 +74,7 @@ auto Board::receive(const hal::can::Frame& frame, std::int64_t now_ns) noexcept
 
 auto Board::sample(const hal::Sample& sample, std::int64_t now_ns) noexcept
     -> std::optional<LoopOutput> {
-  return run_loop(sample, now_ns);
+  return run_loop(with_third_phase(sample), now_ns);
 }
 
 auto Board::run_loop(hal::Sample sample, std::int64_t now_ns) noexcept
@@ -131,8 +139,7 @@ void Board::note_turning(const hal::Sample& sample) noexcept {
 }
 
 bool Board::checks_passed() const noexcept {
-  if (!own_.health.ports_open || (own_.health.has_bus && is_down(own_.health.bus.state)))
-    return false;
+  if (!own_.health.ports_open || (own_.health.has_bus && is_down(own_.health.bus))) return false;
   const float expected_hz = 1e9F / static_cast<float>(config_.sample_period_ns);
   return own_.rate_hz > (1.0F - kRateTolerance_ratio) * expected_hz &&
          own_.rate_hz < (1.0F + kRateTolerance_ratio) * expected_hz;
@@ -168,39 +175,39 @@ control::Permission Board::permission() const noexcept {
 void Board::supervise(const LoopOutput* output) noexcept {
   const CncLink::State& cnc = link_.state();
   const hal::can::MachineState said = cnc.machine.value_or(hal::can::MachineState{});
-  const bool has_force = output != nullptr && (output->present & LoopOutput::kCuttingForce) != 0;
+  const bool has_force =
+      output != nullptr && !output->doubtful && (output->present & LoopOutput::kCuttingForce) != 0;
   if (output != nullptr) own_.signals_refused = output->state == LoopState::kRefused ? 1U : 0U;
-  supervision_ =
-      supervisor_.step({.self_test_done = own_.health.self_test_done,
-                        .self_test_passed = own_.health.self_test_passed,
-                        .checks_passed = checks_passed(),
-                        .output_failed = own_.health.output_failed,
-                        .foreign = cnc.foreign,
-                        .stop = own_.health.stop,
-                        .missed_ticks = own_.health.missed_ticks,
-                        .machine_state_new = link_.fetch_new(),
-                        .bus_down = own_.health.has_bus && is_down(own_.health.bus.state),
-                        .arm = said.arm,
-                        .control = said.control,
-                        .reset = said.reset,
-                        .inhibit = own_.health.lines.inhibit,
-                        .threading = said.threading,
-                        .spindle_at_speed = said.spindle_at_speed,
-                        .feeding = said.cutting_feed || said.rapid,
-                        .sample_new = output != nullptr,
-                        .signals_refused = own_.signals_refused != 0,
-                        .reversed = own_.reversed != 0,
-                        .force_new = has_force,
-                        .force_n = has_force ? output->cutting_force_n : 0.0F,
-                        .force_limit_n = force_limit_n(),
-                        .override_pct = loop_.command().override_pct});
+  supervision_ = supervisor_.step({.self_test_done = own_.health.self_test_done,
+                                   .self_test_passed = own_.health.self_test_passed,
+                                   .checks_passed = checks_passed(),
+                                   .output_failed = own_.health.output_failed,
+                                   .foreign = cnc.foreign,
+                                   .stop = own_.health.stop,
+                                   .missed_ticks = own_.health.missed_ticks,
+                                   .machine_state_new = link_.fetch_new(),
+                                   .bus_down = own_.health.has_bus && is_down(own_.health.bus),
+                                   .arm = said.arm,
+                                   .control = said.control,
+                                   .reset = said.reset,
+                                   .inhibit = own_.health.lines.inhibit,
+                                   .threading = said.threading,
+                                   .spindle_at_speed = said.spindle_at_speed,
+                                   .feeding = said.cutting_feed || said.rapid,
+                                   .sample_new = output != nullptr,
+                                   .signals_refused = own_.signals_refused != 0,
+                                   .reversed = own_.reversed != 0,
+                                   .force_new = has_force,
+                                   .force_n = has_force ? output->cutting_force_n : 0.0F,
+                                   .force_limit_n = force_limit_n(),
+                                   .override_pct = loop_.command().override_pct});
   own_.health.missed_ticks = 0;
 }
 
 // What must not wait for the next sample.
 bool Board::stopping(const BoardHealth& health) const noexcept {
-  const bool down = health.has_bus && is_down(health.bus.state);
-  const bool was_down = own_.health.has_bus && is_down(own_.health.bus.state);
+  const bool down = health.has_bus && is_down(health.bus);
+  const bool was_down = own_.health.has_bus && is_down(own_.health.bus);
   return (health.stop && !own_.health.stop) ||
          (health.output_failed && !own_.health.output_failed) || (down && !was_down);
 }
@@ -234,10 +241,8 @@ auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> Boa
     own_.alive ^= 1U;
     own_.alive_ns = now_ns;
   }
-  out.byte = {.byte = byte(),
-              .alive = own_.alive != 0,
-              .alarm = supervision_.alarm,
-              .again = false};
+  out.byte = {
+      .byte = byte(), .alive = own_.alive != 0, .alarm = supervision_.alarm, .again = false};
   return out;
 }
 
@@ -260,7 +265,8 @@ BoardValues Board::values() const noexcept {
                    .state = state,
                    .reason = reason,
                    .force_n = force_n,
-                   .enabled = supervision_.controlling,
+                   .enabled =
+                       supervision_.controlling || supervision_.state >= SupervisorState::kLinkLost,
                    .saturated_low = supervision_.controlling && last.saturated_low,
                    .saturated_high = supervision_.controlling && last.saturated_high,
                    .in_cut = last.state == LoopState::kCut,

@@ -74,6 +74,12 @@ class Board {
   // reference.
   [[nodiscard]] static std::expected<Board, ConfigError> make(const Config& config) noexcept;
 
+  // On a bus where nobody answers, nothing is heard of the board either.
+  [[nodiscard]] static constexpr bool is_down(const hal::BusStatus& bus) noexcept {
+    return bus.state == hal::BusState::kOff || bus.state == hal::BusState::kDown ||
+           !bus.acknowledged;
+  }
+
   // A frame that came at `now_ns`; a row of the trace where it ended an estimate period.
   [[nodiscard]] std::optional<LoopOutput> receive(const hal::can::Frame& frame,
                                                   std::int64_t now_ns) noexcept;

@@ -13,15 +13,21 @@ std::int64_t nanoseconds(float period_s) noexcept {
 
 auto make_board(const Machine& machine, const BoardWiring& wiring) noexcept
     -> std::expected<Board, BoardFailure> {
+  BoardFailure failure{};
+  failure.what = BoardFailure::What::kLoop;
   const auto loop = make_loop_config(machine);
   if (!loop) {
-    return std::unexpected{
-        BoardFailure{.what = BoardFailure::What::kLoop, .loop = loop.error(), .board = {}}};
+    failure.loop.error = loop.error();
+    return std::unexpected{failure};
+  }
+  if (const auto made = ControlLoop::make(*loop); !made) {
+    failure.loop = {.error = ConfigurationError::kBlock, .block = made.error()};
+    return std::unexpected{failure};
   }
   const std::int64_t sample_period_ns = nanoseconds(1.0F / machine.sample_rate_hz);
   const auto board =
       Board::make({.loop = *loop,
-                   .supervisor = supervisor_config(machine),
+                   .supervisor = make_supervisor_config(machine),
                    .assembler = {.period_ns = sample_period_ns,
                                  .voltage_full_scale_v = wiring.voltage_full_scale_v,
                                  .current_full_scale_a = wiring.current_full_scale_a},
@@ -32,8 +38,9 @@ auto make_board(const Machine& machine, const BoardWiring& wiring) noexcept
                    .force_limit_n = machine.force_limit_n,
                    .sample_period_ns = sample_period_ns});
   if (!board) {
-    return std::unexpected{
-        BoardFailure{.what = BoardFailure::What::kBoard, .loop = {}, .board = board.error()}};
+    failure.what = BoardFailure::What::kBoard;
+    failure.board = board.error();
+    return std::unexpected{failure};
   }
   return *board;
 }

@@ -77,10 +77,9 @@ std::optional<IioWiring> read_iio(TomlSection iio) {
 std::vector<std::uint32_t> read_lines(TomlSection& gpio, std::string_view key) {
   const NumberRule rule{.minimum = 0, .maximum = static_cast<float>(kMostLines - 1), .whole = true};
   std::vector<std::uint32_t> lines;
-  if (!gpio.has(key)) return lines;
-  if (const auto numbers = gpio.numbers(key, 0, rule)) {
-    for (const float number : *numbers) lines.push_back(static_cast<std::uint32_t>(number));
-  }
+  const auto numbers = gpio.numbers(key, 0, rule);
+  if (!numbers) return lines;
+  for (const float number : *numbers) lines.push_back(static_cast<std::uint32_t>(number));
   return lines;
 }
 
@@ -90,7 +89,8 @@ std::optional<std::uint32_t> read_line(TomlSection& gpio, std::string_view key) 
 }
 
 void check_lines(TomlSection& gpio, const GpioWiring& wiring) {
-  if (wiring.data.size() != 8 && wiring.data.size() != 4) {
+  // None: refused already, or missing.
+  if (!wiring.data.empty() && wiring.data.size() != 8 && wiring.data.size() != 4) {
     gpio.refuse("data", std::to_string(wiring.data.size()) + " lines",
                 "give eight offsets, lowest bit first, or four for override_code fanuc_ov_10");
   }

@@ -125,7 +125,7 @@ void ControlThread::run() {
     health.worst_loop_us = std::max(health.worst_loop_us, took_us);
     store(shared_.worst_loop_us, health.worst_loop_us);
     store(shared_.missed_ticks, missed);
-    store(shared_.bus, cycle.bus().state);
+    store(shared_.bus_failed, Board::is_down(cycle.bus()));
     store(shared_.bus_passes, cycle.bus_passes());
     store(shared_.sample_passes, cycle.sample_passes());
     store(shared_.ticks, tick);

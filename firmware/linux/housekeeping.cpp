@@ -65,8 +65,8 @@ void Housekeeping::feed() {
 }
 
 void Housekeeping::restart_bus(std::int64_t now_ns) {
-  const hal::BusState state = shared_.bus.load(std::memory_order_relaxed);
-  if (state == hal::BusState::kOff || state == hal::BusState::kDown) delay_.failed(now_ns);
+  // Also where nobody answers: the frame that waits there would be the first to go out, and old.
+  if (shared_.bus_failed.load(std::memory_order_relaxed)) delay_.failed(now_ns);
   if (!delay_.due(now_ns)) return;
   const auto restarted = ports_.can.restart();
   delay_.restarted(now_ns);

@@ -50,7 +50,6 @@ hal::os::GpioConfig gpio_config(const GpioWiring& wiring, std::uint8_t initial_b
           .acknowledge = perhaps(wiring.acknowledge),
           .inhibit = perhaps(wiring.inhibit),
           .initial_byte = initial_byte,
-          .safe_byte = initial_byte,
           .setup_us = wiring.setup_us,
           .hold_us = wiring.hold_us,
           .consumer = "cutforced"};

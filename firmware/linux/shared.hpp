@@ -8,7 +8,6 @@
 #include "control/supervisor.hpp"
 #include "firmware/linux/ring.hpp"
 #include "firmware/loop_output.hpp"
-#include "hal/can_port.hpp"
 
 namespace cutforce::firmware::board {
 
@@ -30,7 +29,7 @@ struct Shared {
   std::atomic<std::uint64_t> sample_passes{0};  // so was the source
   std::atomic<std::uint64_t> missed_ticks{0};
   std::atomic<std::uint32_t> worst_loop_us{0};
-  std::atomic<hal::BusState> bus{hal::BusState::kActive};
+  std::atomic<bool> bus_failed{false};  // off, down, or without an answer
   // From the first tick in kMonitor or above to the last tick.
   std::atomic<std::uint64_t> armed_ticks{0};
   std::atomic<std::uint64_t> armed_missed{0};

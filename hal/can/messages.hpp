@@ -47,7 +47,7 @@ struct Override {
   std::uint8_t state;                        // control::SupervisorState, 0..15
   std::uint8_t reason;                       // control::Reason, 0..15: the group of the cause
   std::optional<float> force_n;              // steps of 0.5 N
-  bool enabled;                              // the override is the controller's
+  bool enabled;  // to be followed: in control, and after a fault until it is acknowledged
   bool saturated_low;
   bool saturated_high;
   bool in_cut;

@@ -62,10 +62,11 @@ class ByteSequence {
     return ByteInput{.acknowledged = before.acknowledged, .inhibit = *inhibit};
   }
 
-  // What the lines are left with: no sign of life, then the byte. What fails cannot be helped.
-  void leave(std::uint8_t byte) noexcept {
+  // What the lines are left with: no sign of life, and the last byte: any other could be more feed.
+  // What fails cannot be helped.
+  void leave() noexcept {
     (void)lines_.set_alive(false);
-    (void)strobe(byte);
+    if (strobe_up_) (void)strobe_down();
   }
 
   [[nodiscard]] Lines& lines() noexcept { return lines_; }
@@ -73,18 +74,29 @@ class ByteSequence {
  private:
   std::expected<void, PortError> strobe(std::uint8_t byte) noexcept {
     strobed_ = false;  // until it is done: a byte that got stuck half way is written again
+    if (strobe_up_) {  // and needs an edge of its own
+      if (const auto set = strobe_down(); !set) return set;
+      wait_(timing_.hold_ns);
+    }
     if (const auto set = lines_.set_data(byte); !set) return set;
     wait_(timing_.setup_ns);
     seen_inactive_ = false;
     acknowledged_ = !timing_.has_acknowledge;
     if (const auto seen = look_for_acknowledge(); !seen) return seen;
+    strobe_up_ = true;
     if (const auto set = lines_.set_strobe(true); !set) return set;
     wait_(timing_.hold_ns);
     const auto seen = look_for_acknowledge();
-    if (const auto set = lines_.set_strobe(false); !set) return set;
+    if (const auto set = strobe_down(); !set) return set;
     if (!seen) return seen;
     byte_ = byte;
     strobed_ = true;
+    return {};
+  }
+
+  std::expected<void, PortError> strobe_down() noexcept {
+    if (const auto set = lines_.set_strobe(false); !set) return set;
+    strobe_up_ = false;
     return {};
   }
 
@@ -105,6 +117,7 @@ class ByteSequence {
   ByteTiming timing_;
   std::uint8_t byte_ = 0;
   bool strobed_ = false;
+  bool strobe_up_ = false;    // or may be
   bool acknowledged_ = true;  // of the last strobe; before the first nothing is owed
   bool seen_inactive_ = false;
 };

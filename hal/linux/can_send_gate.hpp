@@ -21,8 +21,14 @@ class CanSendGate {
   // after 16 tries. Later than this it is not contention any more. FAULTS 23.
   static constexpr std::int64_t kUnacknowledgedNs = 200'000'000;
 
-  [[nodiscard]] constexpr bool open(std::int64_t now_ns, bool queue_empty) const noexcept {
-    if (!queue_empty) return false;
+  [[nodiscard]] constexpr bool open(std::int64_t now_ns, bool queue_empty) noexcept {
+    if (queue_empty) {
+      queued_ = false;
+    } else if (!queued_) {
+      queued_ = true;
+      queued_ns_ = now_ns;
+    }
+    if (queued_) return false;
     return !waiting_ || (!troubled_ && now_ns - sent_ns_ >= kPatienceNs);
   }
   constexpr void sent(const can::Frame& frame, std::int64_t now_ns) noexcept {
@@ -42,16 +48,19 @@ class CanSendGate {
     return true;
   }
   constexpr void trouble() noexcept { troubled_ = true; }
-  constexpr void forget() noexcept { waiting_ = false; }
+  constexpr void forget() noexcept { waiting_ = queued_ = false; }
 
   [[nodiscard]] constexpr bool unacknowledged(std::int64_t now_ns) const noexcept {
-    return waiting_ && now_ns - sent_ns_ >= kUnacknowledgedNs;
+    return (waiting_ && now_ns - sent_ns_ >= kUnacknowledgedNs) ||
+           (queued_ && now_ns - queued_ns_ >= kUnacknowledgedNs);
   }
 
  private:
   can::Frame frame_{};
   std::int64_t sent_ns_ = 0;
+  std::int64_t queued_ns_ = 0;  // since when something waits in the interface's queue
   bool waiting_ = false;
+  bool queued_ = false;
   bool troubled_ = false;
 };
 

@@ -16,17 +16,16 @@ auto GpioByte::open(const GpioConfig& config) -> std::expected<GpioByte, OpenErr
                           .hold_ns = config.hold_us * kMicrosecondNs,
                           .has_acknowledge = config.acknowledge.has_value(),
                           .has_inhibit = config.inhibit.has_value()};
-  return GpioByte{Sequence{std::move(*lines), Wait{}, timing}, config.safe_byte};
+  return GpioByte{Sequence{std::move(*lines), Wait{}, timing}};
 }
 
-GpioByte::GpioByte(Sequence sequence, std::uint8_t safe_byte) noexcept
-    : sequence_(std::move(sequence)), safe_byte_(safe_byte) {}
+GpioByte::GpioByte(Sequence sequence) noexcept : sequence_(std::move(sequence)) {}
 
 GpioByte::GpioByte(GpioByte&& other) noexcept
-    : sequence_(std::exchange(other.sequence_, std::nullopt)), safe_byte_(other.safe_byte_) {}
+    : sequence_(std::exchange(other.sequence_, std::nullopt)) {}
 
 GpioByte::~GpioByte() {
-  if (sequence_) sequence_->leave(safe_byte_);
+  if (sequence_) sequence_->leave();
 }
 
 auto GpioByte::write(const ByteOutput& output) noexcept -> std::expected<ByteInput, PortError> {

@@ -1,5 +1,5 @@
 // The override byte on the lines of a GPIO chip, as hal::BytePort has it. The destructor takes the
-// sign of life away and leaves the safe byte on the lines. What they do after that, and after a
+// sign of life away and leaves the last byte on the lines. What they do after that, and after a
 // kill, is the chip driver's affair: pull resistors at the CNC choose the safe code.
 #pragma once
 
@@ -33,10 +33,9 @@ class GpioByte {
   };
   using Sequence = ByteSequence<GpioLines, Wait>;
 
-  GpioByte(Sequence sequence, std::uint8_t safe_byte) noexcept;
+  explicit GpioByte(Sequence sequence) noexcept;
 
   std::optional<Sequence> sequence_;  // empty: moved from
-  std::uint8_t safe_byte_;
 };
 static_assert(BytePort<GpioByte>);
 

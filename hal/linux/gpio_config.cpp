@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
-#include <system_error>
 
 namespace cutforce::hal::os {
 namespace {
@@ -80,18 +78,6 @@ auto choose(const GpioConfig& config, const std::vector<GpioChip>& chips)
     }
   }
   return *chip;
-}
-
-std::vector<std::string> gpio_device_paths() {
-  std::vector<std::string> paths;
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator("/dev", ignored)) {
-    if (entry.path().filename().string().starts_with("gpiochip")) paths.push_back(entry.path());
-  }
-  std::ranges::sort(paths, [](const std::string& a, const std::string& b) {
-    return a.size() != b.size() ? a.size() < b.size() : a < b;
-  });
-  return paths;
 }
 
 OpenError line_refused(const GpioConfig& config, const NamedLine& line,

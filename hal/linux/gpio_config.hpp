@@ -28,7 +28,6 @@ struct GpioConfig {
   std::optional<GpioLine> acknowledge;
   std::optional<GpioLine> inhibit;
   std::uint8_t initial_byte;  // on the data lines from the moment they become outputs
-  std::uint8_t safe_byte;     // left on them at the end
   std::uint32_t setup_us;     // data to strobe, 1..10000
   std::uint32_t hold_us;      // strobe's length, 1..10000
   std::string consumer;       // what gpioinfo shows

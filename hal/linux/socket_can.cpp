@@ -216,8 +216,8 @@ auto SocketCan::send(const can::Frame& frame) noexcept -> std::expected<void, Se
     return std::unexpected{SendError::kDown};
   }
   const auto now_ns = monotonic_ns();
-  if (port.gate.unacknowledged(now_ns)) port.monitor.unacknowledged();
   if (!port.gate.open(now_ns, port.queue_empty())) {
+    if (port.gate.unacknowledged(now_ns)) port.monitor.unacknowledged();
     ++port.unsent;
     return std::unexpected{SendError::kNoRoom};
   }

@@ -34,6 +34,7 @@ class Qemu:
         self.events = []
         self._news = threading.Condition()
         self._ended = False
+        self._streams = []
         self._qmp = self._qtest = None
         sockets = [
             *("-qmp", f"unix:{self.folder}/qmp,server=on,wait=off"),
@@ -61,12 +62,11 @@ class Qemu:
             self.process.kill()
         self.process.wait()
         self._reader.join()
-        for stream in (self.process.stdin, self.process.stdout, self._qmp, self._qtest):
-            if stream:
-                try:
-                    stream.close()
-                except OSError:
-                    pass  # the other end is gone with what was still to be written
+        for stream in (self.process.stdin, self.process.stdout, *self._streams):
+            try:
+                stream.close()
+            except OSError:
+                pass  # the other end is gone with what was still to be written
         shutil.rmtree(self.folder, ignore_errors=True)
 
     # The serial port.
@@ -122,7 +122,7 @@ class Qemu:
     def qmp(self, command, **arguments):
         """The answer to a command of the QEMU Machine Protocol; events on the way are kept."""
         if self._qmp is None:
-            self._qmp = self.connect("qmp")
+            self._qmp = self.connect("qmp", mode="rw", encoding="utf-8")
             self._qmp.readline()  # QEMU's greeting
             self.qmp("qmp_capabilities")
         self._qmp.write(json.dumps({"execute": command, "arguments": arguments}) + "\n")
@@ -144,7 +144,7 @@ class Qemu:
     def set_pin(self, device, number, level):
         """Drives an unnamed input pin of a device, given by its path in QEMU's object tree."""
         if self._qtest is None:
-            self._qtest = self.connect("qtest")
+            self._qtest = self.connect("qtest", mode="rw", encoding="utf-8")
         self._qtest.write(f"set_irq_in {device} unnamed-gpio-in {number} {int(level)}\n")
         self._qtest.flush()
         answer = self._qtest.readline().strip()
@@ -163,14 +163,16 @@ class Qemu:
             raise QemuError(f"{len(found)} devices of kind {kind}, not one")
         return found[0]
 
-    def connect(self, name):
-        """A stream to the socket of that name in this machine's folder."""
-        connection = socket.socket(socket.AF_UNIX)
-        while True:  # QEMU makes the sockets a moment after it starts
-            try:
-                connection.connect(str(self.folder / name))
-                return connection.makefile("rw", encoding="utf-8")
-            except OSError as error:
-                if self.process.poll() is not None or time.monotonic() > self.deadline:
-                    raise QemuError(f"QEMU does not answer by {name}") from error
-                time.sleep(0.02)
+    def connect(self, name, **kind):
+        """A stream to the socket of that name in this machine's folder, opened as by open()."""
+        with socket.socket(socket.AF_UNIX) as connection:
+            while True:  # QEMU makes the sockets a moment after it starts
+                try:
+                    connection.connect(str(self.folder / name))
+                    break
+                except OSError as error:
+                    if self.process.poll() is not None or time.monotonic() > self.deadline:
+                        raise QemuError(f"QEMU does not answer by {name}") from error
+                    time.sleep(0.02)
+            self._streams.append(connection.makefile(**kind))
+            return self._streams[-1]

@@ -125,7 +125,7 @@ class Initramfs:
         return b"".join(parts)
 
     def _add(self, path, mode, contents):
-        path = path.strip("/")
+        path = str(path).strip("/")
         for parent in list(pathlib.PurePosixPath(path).parents)[::-1]:
             if str(parent) != ".":
                 self.add_directory(str(parent))

@@ -8,6 +8,7 @@
 //
 // scale and offset of the voltages can be written, so that a test may choose what a count means.
 // /sys/module/cutforce_bench/parameters/scans_lost: scans that found the reader's buffer full.
+#include <linux/bits.h>
 #include <linux/iio/buffer.h>
 #include <linux/iio/iio.h>
 #include <linux/iio/kfifo_buf.h>
@@ -67,6 +68,9 @@ static const struct iio_chan_spec channels[] = {
 	CHANNEL(VOLTAGES + 1, .type = IIO_POWER),
 	IIO_CHAN_SOFT_TIMESTAMP(CHANNELS),
 };
+
+/* A scan always has all channels; the kernel takes from it what a reader enabled. */
+static const unsigned long scan_masks[] = { GENMASK(CHANNELS - 1, 0), 0 };
 
 static enum kind kind_of(const struct iio_chan_spec *channel)
 {
@@ -183,6 +187,7 @@ int cutforce_adc_create(struct device *parent)
 	iio->info = &information;
 	iio->channels = channels;
 	iio->num_channels = ARRAY_SIZE(channels);
+	iio->available_scan_masks = scan_masks;
 	iio->modes = INDIO_DIRECT_MODE;
 
 	failed = devm_iio_kfifo_buffer_setup(parent, iio, NULL);
