@@ -24,8 +24,8 @@ constexpr float kTareFollow_ratio = 0.02F;  // of what the tare belongs to, each
 }  // namespace
 
 FusedObserver::FusedObserver(const Config& config) noexcept
-    : config_(config),
-      flux_(*FluxTorque::make(config.flux)),
+    : flux_(*FluxTorque::make(config.flux)),
+      config_(config),
       filter_(*LoadTorqueFilter::make(config.filter)),
       air_(*AirCut::make(config.air)),
       noise_({.sample_period_s = config.flux.sample_period_s,
@@ -65,18 +65,6 @@ void FusedObserver::restore(const State& state) noexcept {
   resistance_.restore(state.resistance);
   meter_.restore(state.meter);
   tick_ = state.tick;
-}
-
-void FusedObserver::step(const Sample& sample) noexcept {
-  flux_.step(sample.motor, sample.elapsed_periods);
-  if (sample.speed_valid) {
-    tick_.speed_sum_rad_s += sample.speed_rad_s;
-    ++tick_.speed_count;
-  }
-  if (sample.meter_valid) {
-    tick_.meter_w = sample.power_meter_w;
-    ++tick_.meter_count;
-  }
 }
 
 void FusedObserver::recalibrated(SpaceVector voltage_offset_v,
@@ -181,8 +169,8 @@ void FusedObserver::learn(const FluxTorque::Window& window, const Rotation& r, c
     tick_.idle_copper += share * (copper - tick_.idle_copper);
     tick_.idle_power_torque_nm += share * (power - tick_.idle_power_torque_nm);
   }
-  if (tick_.meter_count > 0) meter_.step(window.power_w, tick_.meter_w, out.duration_s);
-  tick_.meter_count = 0;
+  if (tick_.has_meter != 0) meter_.step(window.power_w, tick_.meter_w, out.duration_s);
+  tick_.has_meter = 0;
   if (!config_.track_resistance || config_.sensorless) return;
   // |psi_R|^2 with the resistance found so far: psi less dR i / (j w_e).
   const float k = resistance_.change_ohm() / tick_.frequency_rad_s;

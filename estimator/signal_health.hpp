@@ -143,16 +143,21 @@ class SignalHealth {
 
   [[nodiscard]] static std::expected<SignalHealth, ConfigError> make(const Config& config) noexcept;
 
-  // Every sample that passed the gate.
+  // Every sample that passed the gate; in two parts, so that a sample need not be made an
+  // observation that nobody looks at.
   void observe(const Observation& observation) noexcept {
-    state_.elapsed_periods += observation.elapsed_periods;
-    state_.at_end_channels |= observation.at_end_channels;
-    if (state_.countdown-- == 0) {
-      state_.picked = observation;
-      state_.picked.elapsed_periods = state_.elapsed_periods;
-      state_.elapsed_periods = 0.0F;
-      state_.is_picked = 1;
-    }
+    if (wants(observation.elapsed_periods, observation.at_end_channels)) look(observation);
+  }
+  [[nodiscard]] bool wants(float elapsed_periods, std::uint32_t at_end_channels) noexcept {
+    state_.elapsed_periods += elapsed_periods;
+    state_.at_end_channels |= at_end_channels;
+    return state_.countdown-- == 0;
+  }
+  void look(const Observation& observation) noexcept {
+    state_.picked = observation;
+    state_.picked.elapsed_periods = state_.elapsed_periods;
+    state_.elapsed_periods = 0.0F;
+    state_.is_picked = 1;
   }
 
   // Ends a tick.
