@@ -209,6 +209,8 @@ class FusedObserver {
   RunUpInertia inertia_;
   StatorResistance resistance_;
   PowerScale meter_;
+  float share_of_s_ = 0.0F;  // length of the tick that share_, of (E101), belongs to
+  float share_ = 0.0F;
 };
 
 static_assert(std::is_trivially_copyable_v<FusedObserver>);

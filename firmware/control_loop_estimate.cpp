@@ -24,6 +24,20 @@ bool doubtful(estimator::FaultSet faults) noexcept {
          faults.contains(Fault::kPhaseOrder) || faults.contains(Fault::kClipped);
 }
 
+// Field by field, because `{}` becomes newlib's memset, three times as many instructions.
+[[gnu::always_inline]] inline void clear(LoopOutput& out, std::int64_t time_ns) noexcept {
+  out.time_ns = time_ns;
+  out.airgap_power_w = out.measured_power_w = out.airgap_torque_nm = out.load_torque_nm = 0.0F;
+  out.cutting_torque_nm = out.cutting_torque_sigma_nm = 0.0F;
+  out.cutting_force_n = out.cutting_force_sigma_n = out.override_pct = 0.0F;
+  out.process_gain_n_pct = out.process_gain_sigma_ratio = out.stability_margin_ratio = 0.0F;
+  out.present = 0;
+  out.faults = {};
+  out.source = Source::kNone;
+  out.state = LoopState::kStarting;
+  out.control_tick = false;
+}
+
 }  // namespace
 
 void ControlLoop::watch_health(LoopOutput& out) noexcept {
@@ -193,8 +207,8 @@ void ControlLoop::add_force(LoopOutput& out) noexcept {
 }
 
 auto ControlLoop::close_estimate() noexcept -> LoopOutput {
-  LoopOutput out{};
-  out.time_ns = time_ns();
+  LoopOutput out;
+  clear(out, time_ns());
   ++own_.estimates;
   const bool control = own_.estimates >= config_.estimates_per_control;
   switch (config_.estimator) {
@@ -218,8 +232,7 @@ auto ControlLoop::close_estimate() noexcept -> LoopOutput {
       if (out.state != LoopState::kRefused) out.state = LoopState::kStarting;
       const LoopState state = out.state;
       const estimator::FaultSet faults = out.faults;
-      out = LoopOutput{};
-      out.time_ns = time_ns();
+      clear(out, time_ns());
       out.state = state;
       out.faults = faults;
     }
