@@ -47,20 +47,18 @@ void guard_stack() noexcept {
   kSystemControl.store(kMpuBase, begin | kReadOnly | kNoExecution);
   kSystemControl.store(kMpuAttributes, last | kEnable);
 #else
-  // No access, no execution; 32 bytes: SIZE is log2 of the bytes less one.
+  // No access, no execution. SIZE is the logarithm of the bytes, less one: 64 KiB.
   constexpr std::uint32_t kNoExecution = 1U << 28;
-  constexpr std::uint32_t kSize32 = 4U << 1;
+  constexpr std::uint32_t kSize = 15U << 1;
   kSystemControl.store(kMpuBase, begin);
-  kSystemControl.store(kMpuAttributes, kNoExecution | kSize32 | kEnable);
+  kSystemControl.store(kMpuAttributes, kNoExecution | kSize | kEnable);
 #endif
   kSystemControl.store(kMpuControl, kDefaultMap | kEnable);
   asm volatile("dsb\n\tisb" ::: "memory");
 }
 
 bool is_below_stack(std::uint32_t address) noexcept {
-  constexpr std::uint32_t kReach = 64U * 1024U;  // a frame is not larger
-  const std::uint32_t top = address_of(stack_begin);
-  return address < top && address >= top - kReach;
+  return address >= address_of(stack_guard_begin) && address < address_of(stack_begin);
 }
 
 }  // namespace cutforce::hal::cortex_m

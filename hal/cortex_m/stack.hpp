@@ -1,7 +1,8 @@
 // The stack: how deep it has been, and the guard below it.
 //
-// Where it lies is the linker script's (sections.ld). The guard is a region of the MPU that nothing
-// may write to: what overflows the stack is stopped there, and the fault handler names it.
+// It lies at the begin of RAM (sections.ld). The guard is a region of the MPU over the 64 KiB below,
+// which costs no memory: what overflows the stack, by a word or by a large frame, is stopped there,
+// and the fault handler names it.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +21,7 @@ void paint_stack() noexcept;
 // Turns the MPU on, with the one region; everything else keeps the default memory map.
 void guard_stack() noexcept;
 
-// Whether an address lies in the guard or, in RAM that is not there, right below it.
+// Whether an address lies in the guard.
 [[nodiscard]] bool is_below_stack(std::uint32_t address) noexcept;
 
 }  // namespace cutforce::hal::cortex_m
