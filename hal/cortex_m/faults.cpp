@@ -39,9 +39,11 @@ alignas(8) std::array<std::uint32_t, 64> fault_stack;
 
 void tell_and_stop(std::uint32_t handler, const SavedState* saved) {
   const std::uint32_t status = kSystemControl.load(kFaultStatus);
-  tell_fault(kHandlerNames[handler], status, kSystemControl.load(kHardFaultStatus),
-             kSystemControl.load(kMemManageAddress), kSystemControl.load(kBusFaultAddress),
-             &console::write, &is_below_stack);
+  tell_fault(
+      kHandlerNames[handler], status, kSystemControl.load(kHardFaultStatus),
+      kSystemControl.load(kMemManageAddress), kSystemControl.load(kBusFaultAddress),
+      [](std::string_view text) { console::write(text); },
+      [](std::uint32_t address) { return is_below_stack(address); });
   // Below the stack nothing was saved, and reading there would be the next fault.
   if (!is_stacking(status) && !is_below_stack(reinterpret_cast<std::uint32_t>(saved))) {
     const auto place = hexadecimal(saved->place);
