@@ -15,8 +15,10 @@
 // free of jumps; the law follows what was sent while another line decides (law.hpp). While the
 // loop controls, nothing but a fresh estimate lets the override rise.
 //
-// Enabling is a level here. Who may enable, edges, latches and the feed-hold request on the hard
-// force limit belong to the supervisor.
+// The permission (permission.hpp) is a set of levels here: it can forbid the controller or any
+// rise, narrow the range of the override, and name another force to hold, for this tick. Who may
+// permit what, edges, latches and the feed-hold request on the hard force limit belong to the
+// supervisor.
 #pragma once
 
 #include <algorithm>
@@ -32,6 +34,7 @@
 #include "control/law.hpp"
 #include "control/law_set.hpp"
 #include "control/override_code.hpp"
+#include "control/permission.hpp"
 
 namespace cutforce::control {
 
@@ -102,7 +105,7 @@ class BasicControlPath {
     float spindle_ratio;     // spindle speed over the programmed one; 1 where not known
     bool force_valid;        // false: there is no estimate
     bool override_reported;  // false: the CNC tells nothing
-    bool enable;
+    Permission permission;
     bool part_start;  // the program of a part starts
   };
 
@@ -145,15 +148,16 @@ class BasicControlPath {
                                           .age_ticks = input.force_age_ticks,
                                           .valid = input.force_valid});
     const bool fresh = force.outcome == ForceOutcome::kFresh;
+    const float force_reference_n = reference(input.permission.force_reference_n);
     const auto cut = cut_state_.step(
-        {.force_n = force.force_n, .force_reference_n = force_reference_n_, .fresh = fresh});
+        {.force_n = force.force_n, .force_reference_n = force_reference_n, .fresh = fresh});
     const auto applied = applied_override_.step({.sent_pct = feed_override_.sent_pct(),
                                                  .reported_pct = input.override_reported_pct,
                                                  .reported = input.override_reported});
     if (fresh) started_ = 1;
-    const Decision decision = decide(input.enable && started_ != 0, force.outcome, cut);
+    const Decision decision = decide(input.permission.enable && started_ != 0, force.outcome, cut);
 
-    const auto law = law_.step({.force_reference_n = force_reference_n_,
+    const auto law = law_.step({.force_reference_n = force_reference_n,
                                 .force_n = force.force_n,
                                 .force_sigma_n = force.force_sigma_n,
                                 .override_applied_pct = applied.applied_pct,
@@ -167,7 +171,10 @@ class BasicControlPath {
                                  ? std::min(law.override_pct, decision.wanted_pct)
                                  : decision.wanted_pct;
     const auto sent =
-        feed_override_.step({.wanted_pct = wanted_pct, .may_rise = decision.may_rise});
+        feed_override_.step({.wanted_pct = wanted_pct,
+                             .may_rise = decision.may_rise && input.permission.may_rise,
+                             .ceiling_pct = input.permission.ceiling_pct,
+                             .floor_pct = input.permission.floor_pct});
     return {.override_pct = sent.override_pct,
             .override_code = encode(code_, sent.override_pct),
             .controlling = decision.controlling,
@@ -225,11 +232,17 @@ class BasicControlPath {
         fallback_pct_(config.fallback_pct),
         fall_pct_per_tick_(config.fall_pct_s * config.feed_override.period_s),
         code_(config.code),
+        highest_n_(config.force_input.highest_n),
         force_input_(*ForceInput::make(config.force_input)),
         cut_state_(*CutState::make(config.cut_state)),
         law_(*L::make(config.law)),
         feed_override_(*FeedOverride::make(config.feed_override)),
         applied_override_(*AppliedOverride::make(config.applied_override)) {}
+
+  // The permitted force to hold, if there is one; NaN is none.
+  [[nodiscard]] constexpr float reference(float permitted_n) const noexcept {
+    return permitted_n > 0.0F ? std::min(permitted_n, highest_n_) : force_reference_n_;
+  }
 
   // The table at the top of this file, in its order.
   [[nodiscard]] constexpr Decision decide(bool controlling, ForceOutcome force,
@@ -282,6 +295,7 @@ class BasicControlPath {
   float fallback_pct_;
   float fall_pct_per_tick_;
   OverrideCode code_;
+  float highest_n_;
   ForceInput force_input_;
   CutState cut_state_;
   L law_;

@@ -4,9 +4,10 @@
 //   sent(i) = sent(i-1) while |P - sent| <= step / 2 + hysteresis, else P rounded to a step
 //
 // P is the position between two steps, [%], so that a slew rate below one step a tick still gets
-// there. Floor and ceiling are moved inward to a step. The output is what is really sent; it is
-// finite and within the limits whatever comes in, and does not rise unless it may. A command
-// that is not finite holds.
+// there. Floor and ceiling are moved inward to a step. Each step may narrow them, never widen: a
+// new ceiling is reached at the slew rate, the ceiling wins over the floor, and one that is not a
+// number lets nothing rise. The output is what is really sent; it is finite and within the limits
+// whatever comes in, and does not rise unless it may. A command that is not finite holds.
 #pragma once
 
 #include <algorithm>
@@ -70,6 +71,8 @@ class FeedOverride {
   struct Input {
     float wanted_pct;
     bool may_rise;
+    float ceiling_pct = 254.0F;  // for this step, inside the configured range
+    float floor_pct = 0.0F;      // likewise; raises nothing that may not rise
   };
 
   struct Output {
@@ -92,10 +95,13 @@ class FeedOverride {
   [[nodiscard]] constexpr Output step(const Input& input) noexcept {
     std::uint32_t limits = kNoLimit;
     float target_pct = state_.position_pct;
+    const float high_pct = narrowed_high(input.ceiling_pct);
+    const float low_pct = narrowed_low(input.floor_pct, high_pct);
+    const bool may_rise = input.may_rise && input.ceiling_pct >= 0.0F;
     if (input.wanted_pct >= -kLargest && input.wanted_pct <= kLargest) {
-      target_pct = std::clamp(input.wanted_pct, lowest_pct_, highest_pct_);  // (C8)
-      if (input.wanted_pct < lowest_pct_) limits |= kFloorLimit;
-      if (input.wanted_pct > highest_pct_) limits |= kCeilingLimit;
+      target_pct = std::clamp(input.wanted_pct, low_pct, high_pct);  // (C8)
+      if (input.wanted_pct < low_pct) limits |= kFloorLimit;
+      if (input.wanted_pct > high_pct) limits |= kCeilingLimit;
     } else {
       limits |= kNotFinite;
     }
@@ -107,7 +113,7 @@ class FeedOverride {
     float position_pct = std::clamp(target_pct, down_pct, up_pct);  // (C9)
 
     const auto sent_pct = static_cast<float>(state_.sent_pct);
-    if (!input.may_rise && position_pct > state_.position_pct) {
+    if (!may_rise && position_pct > state_.position_pct) {
       limits |= kRiseForbidden;
       position_pct = state_.position_pct;
     }
@@ -140,6 +146,20 @@ class FeedOverride {
         slew_down_pct_(config.slew_down_pct_s * config.period_s) {
     state_.position_pct = std::clamp(config.initial_pct, lowest_pct_, highest_pct_);
     state_.sent_pct = rounded(state_.position_pct);
+  }
+
+  // The outermost steps within what is configured and what this step allows.
+  [[nodiscard]] constexpr float narrowed_high(float ceiling_pct) const noexcept {
+    if (!(ceiling_pct < highest_pct_)) return highest_pct_;
+    if (!(ceiling_pct > lowest_pct_)) return lowest_pct_;
+    return static_cast<float>(static_cast<std::uint32_t>(ceiling_pct) / step_pct_ * step_pct_);
+  }
+  [[nodiscard]] constexpr float narrowed_low(float floor_pct, float high_pct) const noexcept {
+    if (!(floor_pct > lowest_pct_)) return lowest_pct_;
+    if (!(floor_pct < high_pct)) return high_pct;
+    const auto below =
+        static_cast<float>(static_cast<std::uint32_t>(floor_pct) / step_pct_ * step_pct_);
+    return below < floor_pct ? below + static_cast<float>(step_pct_) : below;
   }
 
   // To the nearest step; half a step goes down. lowest_pct_ <= position <= highest_pct_.

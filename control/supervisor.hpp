@@ -6,16 +6,33 @@
 //                            kLinkLost, kProtect, kSafe: latched;  kDead: for good
 //
 // Rules: a fault never raises the feed; only downward transitions are automatic; nothing resumes by
-// itself but kHold; arming, control and reset are rising edges; monitor is the default. Source and
-// reasons: SUPERVISOR.md.
+// itself but kHold; arming, control and reset are rising edges, of a level seen low in that very
+// state; monitor is the default. Source and reasons: SUPERVISOR.md.
+//
+// What goes out:
+//   kBoot, kSelfTest, kCheck  as it was; neutral at the start
+//   kReady, kMonitor          the controller's, who is off and goes to neutral at its own slew
+//   rate,
+//                             so that giving back is free of jumps; never above neutral from below
+//   kControl                  the controller's
+//   kHold                     the lowest since the hold began; where the CNC forbids control or
+//   cuts
+//                             a thread the controller is off, and it is min(last, neutral)
+//   kLinkLost, kSafe, kDead   min(last, neutral), and if the controller had moved it, down from
+//   there
+//                             with fall_pct_s to min(last, fallback); kDead does not wait for that
+//   kProtect                  min(last, hold), at once
+// The output does not rise in the step of any transition, and never above the controller's. The
+// permission's ceiling keeps the controller at what went out, to the ends of its own range.
 //
 // It is stepped once an estimate period, by the samples where they come and by the board's clock
-// where they do not; the period is all it knows of time.
+// where they do not; the period is all it knows of time. Missed ticks make everything older that is
+// waited for, and never end a hold sooner. Time-outs are whole steps, the nearest, one at least.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <expected>
-#include <optional>
 #include <type_traits>
 
 #include "control/permission.hpp"
@@ -82,7 +99,27 @@ class Supervisor {
     float overrun_window_s;    // 1
     float overrun_ratio;       // 0.01 of the ticks in the window; or three in a row
 
-    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept {
+      if (!(period_s >= 1e-5F && period_s <= 10.0F)) return std::unexpected{ConfigError::kPeriod};
+      if (!(time(link_timeout_s) && time(samples_timeout_s) && time(estimate_timeout_s) &&
+            time(overrun_window_s)))
+        return std::unexpected{ConfigError::kTime};
+      if (!(overrun_ratio > 0.0F && overrun_ratio <= 1.0F))
+        return std::unexpected{ConfigError::kTime};
+      if (!(percent(neutral_pct) && percent(fallback_pct) && percent(hold_pct)))
+        return std::unexpected{ConfigError::kOverride};
+      if (!(fall_pct_s > 0.0F && fall_pct_s <= 1e6F)) return std::unexpected{ConfigError::kFall};
+      if (!time(hold_release_s)) return std::unexpected{ConfigError::kRelease};
+      return {};
+    }
+
+   private:
+    [[nodiscard]] static constexpr bool percent(float value) noexcept {
+      return value >= 0.0F && value <= 254.0F;
+    }
+    [[nodiscard]] static constexpr bool time(float value) noexcept {
+      return value > 0.0F && value <= 3600.0F;
+    }
   };
 
   struct Input {
@@ -92,7 +129,7 @@ class Supervisor {
     bool checks_passed;          // configuration, lines and bus are as the machine file says
     bool output_failed;          // byte or frame could not be handed over
     bool foreign;                // our own identifier, from another node
-    bool stop;                   // the service ends: to kSafe, for good
+    bool stop;                   // the service ends: to kDead, for good
     std::uint32_t missed_ticks;  // since the last step
     // The link
     bool machine_state_new;  // an accepted frame since the last step
@@ -127,8 +164,68 @@ class Supervisor {
     bool changed;           // the state or the reason is another than before this step
   };
 
+  static constexpr std::uint32_t kNever = 1'000'000'000;  // an age; steps
+  static constexpr std::uint32_t kArmBit = 1;
+  static constexpr std::uint32_t kControlBit = 2;
+  static constexpr std::uint32_t kResetBit = 4;
+
+  struct State {
+    SupervisorState state;
+    Reason reason;
+    std::uint8_t override_pct;  // as it went out
+    std::uint8_t lows;          // levels seen low in this state
+    std::uint32_t controlled;   // 1: in control, or was when the fault came
+    std::uint32_t forces_over;  // of the last three, a bit each
+    float force_n;              // the last one
+    float position_pct;         // of the fall
+    float fall_to_pct;
+    std::uint32_t link_age;  // steps since a new frame; and so on
+    std::uint32_t sample_age;
+    std::uint32_t force_age;
+    std::uint32_t estimate_age;  // the same, in kControl alone
+    std::uint32_t calm_steps;    // without a cause to hold
+    std::uint32_t missed_run;    // ticks missed in a row
+    std::uint32_t window_steps;  // in the newest eighth of the window
+    std::uint32_t window_part;   // which that is
+    std::array<std::uint32_t, 8> missed;
+  };
+
+  // Fails iff check() does.
   [[nodiscard]] static std::expected<Supervisor, ConfigError> make(const Config& config) noexcept;
   [[nodiscard]] Output step(const Input& input) noexcept;
+
+  [[nodiscard]] const State& state() const noexcept { return state_; }
+  void restore(const State& state) noexcept { state_ = state; }
+
+ private:
+  explicit Supervisor(const Config& config) noexcept;
+
+  [[nodiscard]] std::uint32_t steps(float time_s) const noexcept;
+  void note_ages(const Input& input) noexcept;
+  void note_force(const Input& input) noexcept;
+  void note_missed(std::uint32_t missed_ticks) noexcept;
+  [[nodiscard]] bool overran() const noexcept;
+  [[nodiscard]] bool protect_clear(const Input& input) const noexcept;
+  [[nodiscard]] bool safe_clear(const Input& input) const noexcept;
+  [[nodiscard]] std::uint32_t faults(const Input& input) const noexcept;
+  [[nodiscard]] std::uint32_t holds(const Input& input) const noexcept;
+  [[nodiscard]] std::uint32_t requests(const Input& input) const noexcept;
+  void enter(SupervisorState before, bool force_over) noexcept;
+  [[nodiscard]] std::uint8_t following(std::uint8_t controller_pct) const noexcept;
+  [[nodiscard]] bool controller_off() const noexcept;
+  [[nodiscard]] Permission permission() const noexcept;
+
+  Config config_;
+  std::uint32_t link_steps_;
+  std::uint32_t samples_steps_;
+  std::uint32_t estimate_steps_;
+  std::uint32_t release_steps_;
+  std::uint32_t window_part_steps_;
+  float missed_most_;
+  State state_{};
 };
+
+static_assert(std::is_trivially_copyable_v<Supervisor>);
+static_assert(sizeof(Supervisor::State) == 4 + 13 * 4 + 8 * 4);
 
 }  // namespace cutforce::control

@@ -69,7 +69,7 @@ class SynchronousSpeed {
         return std::unexpected{ConfigError::kPolePairs};
       }
       if (!(stator_resistance_ohm >= 0.0F && stator_resistance_ohm < 1e4F &&
-            leakage_inductance_h >= 0.0F && leakage_inductance_h < 10.0F)) {
+            leakage_inductance_h >= 0.0F && leakage_inductance_h <= 10.0F)) {
         return std::unexpected{ConfigError::kMotor};
       }
       if (!(flux_leak_rad_s > 0.0F && flux_leak_rad_s * sample_period_s < 1.0F)) {

@@ -17,6 +17,7 @@
 #include <type_traits>
 
 #include "control/control_path.hpp"
+#include "control/permission.hpp"
 #include "estimator/cutting_force.hpp"
 #include "estimator/front_end.hpp"
 #include "estimator/fused_observer.hpp"
@@ -96,6 +97,11 @@ class ControlLoop {
     estimator::FaultSet faults{};  // since the last output
     std::uint32_t feed = 0;        // 0 unknown, 1 idle, 2 active
     std::uint32_t enabled = 1;
+    std::uint32_t permitted = 1;  // control::Permission, without its padding
+    std::uint32_t may_rise = 1;
+    float ceiling_pct = control::kEverything.ceiling_pct;
+    float floor_pct = control::kEverything.floor_pct;
+    float force_reference_n = control::kEverything.force_reference_n;
     std::uint32_t part_signal = 0;  // as it was in the last sample
     std::uint32_t part_start = 0;   // 1: a part has started in the control period so far
     std::uint32_t override_reported = 0;
@@ -103,7 +109,9 @@ class ControlLoop {
     estimator::Calibration calibration{};
     estimator::TorquePath::Output path{};
     std::uint32_t has_path = 0;
-    control::LawOutput law{};  // of the last control tick
+    control::LawOutput law{};         // of the last control tick
+    std::uint32_t saturated_low = 0;  // likewise
+    std::uint32_t saturated_high = 0;
     LoopOutput last{};
   };
 
@@ -130,6 +138,10 @@ class ControlLoop {
   // Puts another law in charge from the next control tick on (control/law_set.hpp).
   void select(control::LawName name) noexcept { controller_.select(name); }
 
+  // What the controller may do from the next control tick on; everything until somebody says so.
+  // The samples' own enable signal still counts.
+  void permit(const control::Permission& permission) noexcept;
+
   [[nodiscard]] State state() const noexcept;
   void restore(const State& state) noexcept;
 
@@ -150,6 +162,7 @@ class ControlLoop {
   [[nodiscard]] float path_frequency_rad_s() const noexcept;
   void estimate_dynamometer(LoopOutput& out) noexcept;
   void add_force(LoopOutput& out) noexcept;
+  [[nodiscard]] control::Permission permission() const noexcept;
   void control_tick(LoopOutput& out) noexcept;
   void publish_control(LoopOutput& out) const noexcept;
 

@@ -231,7 +231,8 @@ auto ControlLoop::close_estimate() noexcept -> LoopOutput {
     out.faults = own_.faults;
     own_.faults = {};
   }
-  if ((out.present & LoopOutput::kCuttingForce) != 0 && !(by_motor && doubtful(out.faults))) {
+  out.doubtful = by_motor && doubtful(out.faults);
+  if ((out.present & LoopOutput::kCuttingForce) != 0 && !out.doubtful) {
     own_.force_n += out.cutting_force_n;
     own_.force_sigma_n += out.cutting_force_sigma_n;
     ++own_.force_count;

@@ -36,6 +36,22 @@ void ControlLoop::note_commands(const hal::Sample& sample) noexcept {
   }
 }
 
+void ControlLoop::permit(const control::Permission& permission) noexcept {
+  own_.permitted = permission.enable ? 1U : 0U;
+  own_.may_rise = permission.may_rise ? 1U : 0U;
+  own_.ceiling_pct = permission.ceiling_pct;
+  own_.floor_pct = permission.floor_pct;
+  own_.force_reference_n = permission.force_reference_n;
+}
+
+control::Permission ControlLoop::permission() const noexcept {
+  return {.enable = config_.control && own_.enabled != 0 && own_.permitted != 0,
+          .may_rise = own_.may_rise != 0,
+          .ceiling_pct = own_.ceiling_pct,
+          .floor_pct = own_.floor_pct,
+          .force_reference_n = own_.force_reference_n};
+}
+
 void ControlLoop::control_tick(LoopOutput& out) noexcept {
   const bool valid = own_.force_count > 0 && own_.force_due == 0;
   const float count = own_.force_count > 0 ? static_cast<float>(own_.force_count) : 1.0F;
@@ -49,13 +65,15 @@ void ControlLoop::control_tick(LoopOutput& out) noexcept {
                         .spindle_ratio = spindle_ratio(speed_rad_s, config_.programmed_speed_rad_s),
                         .force_valid = valid,
                         .override_reported = own_.override_reported != 0,
-                        .enable = config_.control && own_.enabled != 0,
+                        .permission = permission(),
                         .part_start = own_.part_start != 0});
   command_ = {.time_ns = own_.time_ns,
               .override_pct = controlled.override_pct,
               .override_code = controlled.override_code,
               .controlling = controlled.controlling};
   own_.law = controlled.law;
+  own_.saturated_low = controlled.saturated_low ? 1U : 0U;
+  own_.saturated_high = controlled.saturated_high ? 1U : 0U;
   own_.part_start = 0;
   own_.speed_sum_rad_s = 0.0F;
   own_.speed_count = 0;
@@ -68,6 +86,8 @@ void ControlLoop::publish_control(LoopOutput& out) const noexcept {
   if (!config_.control) return;
   out.override_pct = static_cast<float>(command_.override_pct);
   out.present |= LoopOutput::kOverride;
+  out.saturated_low = own_.saturated_low != 0;
+  out.saturated_high = own_.saturated_high != 0;
   if (own_.law.process_gain_n_pct > 0.0F) {
     out.process_gain_n_pct = own_.law.process_gain_n_pct;
     out.process_gain_sigma_ratio = own_.law.process_gain_sigma_ratio;

@@ -49,7 +49,10 @@ struct LoopOutput {
   estimator::FaultSet faults;
   Source source;
   LoopState state;
-  bool control_tick;  // the row ends a control period: override_pct is new
+  bool control_tick;    // the row ends a control period: override_pct is new
+  bool doubtful;        // the force is to be seen, not to be acted on: faults says why
+  bool saturated_low;   // controlling, and the floor acts, since the last control tick
+  bool saturated_high;  // controlling, and the ceiling acts
 };
 
 }  // namespace cutforce::firmware

@@ -31,6 +31,7 @@ enum class ControllerName : std::uint8_t {
   kPredictive
 };
 enum class MracForm : std::uint8_t { kOutputError, kStateError };
+enum class SupervisorMode : std::uint8_t { kAdvise, kControl };
 enum class PowerMode : std::uint8_t { kDotProduct, kTwoWattmeter, kFixedPowerFactor };
 enum class SpeedSource : std::uint8_t { kRotor, kSynchronous, kSlip };
 enum class SwitchMode : std::uint8_t { kAbsolute, kPositiveOnly };
@@ -176,6 +177,19 @@ struct Machine {
   float mrac_state_scale_ratio;
   float mrac_state_gain_ratio;  // mu
   float mrac_feed_mm_s_pct;
+
+  // [supervisor] who may move the feed, and what goes out when nobody may
+  SupervisorMode supervisor_mode;
+  bool link_required;    // a CNC that sends MachineState
+  float fallback_pct;    // where the override falls to after a fault
+  float hold_pct;        // the feed-hold request
+  float fall_pct_s;      // on the way to fallback_pct
+  float link_timeout_s;  // since the last new frame
+  float samples_timeout_s;
+  float estimate_timeout_s;
+  float hold_release_s;
+  float overrun_window_s;
+  float overrun_ratio;
 
   friend constexpr bool operator==(const Machine&, const Machine&) noexcept = default;
 };

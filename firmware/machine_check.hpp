@@ -5,6 +5,7 @@
 #include <expected>
 
 #include "firmware/machine_check_control.hpp"
+#include "firmware/machine_check_supervisor.hpp"
 
 namespace cutforce::firmware {
 
@@ -183,7 +184,8 @@ inline constexpr auto kMotorRules = std::to_array<MachineRule>({
 
 }  // namespace detail
 
-inline constexpr auto kMachineRules = detail::joined(detail::kMotorRules, detail::kControlRules);
+inline constexpr auto kMachineRules = detail::joined(
+    detail::kMotorRules, detail::joined(detail::kControlRules, detail::kSupervisorRules));
 
 // Every value within its range and every rule kept; the error is the key to blame.
 [[nodiscard]] constexpr std::expected<void, std::string_view> check(

@@ -23,10 +23,11 @@ enum class Section : std::uint8_t {
   kSpindle,
   kPowerMeter,
   kEstimator,
-  kControl
+  kControl,
+  kSupervisor
 };
-inline constexpr std::array<std::string_view, 7> kSectionNames{
-    "signals", "motor", "friction", "spindle", "power_meter", "estimator", "control"};
+inline constexpr std::array<std::string_view, 8> kSectionNames{
+    "signals", "motor", "friction", "spindle", "power_meter", "estimator", "control", "supervisor"};
 [[nodiscard]] constexpr std::string_view name_of(Section section) noexcept {
   return kSectionNames[static_cast<std::size_t>(section)];
 }
@@ -56,6 +57,7 @@ inline constexpr std::array<std::string_view, 2> kMracForm{"output_error", "stat
 inline constexpr std::array<std::string_view, 3> kPower{"dot_product", "two_wattmeter", "fixed_pf"};
 inline constexpr std::array<std::string_view, 3> kSpeed{"rotor", "synchronous", "slip"};
 inline constexpr std::array<std::string_view, 2> kSwitch{"absolute", "positive_only"};
+inline constexpr std::array<std::string_view, 2> kSupervisorMode{"advise", "control"};
 inline constexpr std::array<std::string_view, 5> kCode{"binary", "fanuc_fv", "fanuc_ov_10",
                                                        "siemens_gray", "siemens_binary"};
 }  // namespace detail
@@ -70,6 +72,8 @@ template <>
 inline constexpr std::span<const std::string_view> kNames<ControllerName>{detail::kController};
 template <>
 inline constexpr std::span<const std::string_view> kNames<MracForm>{detail::kMracForm};
+template <>
+inline constexpr std::span<const std::string_view> kNames<SupervisorMode>{detail::kSupervisorMode};
 template <>
 inline constexpr std::span<const std::string_view> kNames<PowerMode>{detail::kPower};
 template <>

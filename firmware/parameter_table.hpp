@@ -15,6 +15,7 @@
 #include "firmware/parameter_describe.hpp"
 #include "firmware/parameter_table_control.hpp"
 #include "firmware/parameter_table_printed.hpp"
+#include "firmware/parameter_table_supervisor.hpp"
 
 namespace cutforce::firmware {
 namespace detail {
@@ -210,9 +211,10 @@ namespace detail {
 
 }  // namespace detail
 
-inline constexpr auto kParameters =
-    detail::joined(detail::machine_parameters(),
-                   detail::joined(detail::control_parameters(), detail::printed_parameters()));
+inline constexpr auto kParameters = detail::joined(
+    detail::machine_parameters(),
+    detail::joined(detail::control_parameters(),
+                   detail::joined(detail::printed_parameters(), detail::supervisor_parameters())));
 
 // Position in kParameters, or none.
 [[nodiscard]] constexpr std::optional<std::size_t> find_parameter(std::string_view key) noexcept {

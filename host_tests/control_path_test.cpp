@@ -76,7 +76,7 @@ constexpr PiPath::Input at(double force_n) {
           .spindle_ratio = 1.0F,
           .force_valid = true,
           .override_reported = false,
-          .enable = true,
+          .permission = kEverything,
           .part_start = false};
 }
 
@@ -278,7 +278,7 @@ TEST(ControlPath, IsNotControllingBeforeTheFirstEstimateAndWhileDisabled) {
     EXPECT_EQ(output.override_pct, 100);
   }
   auto disabled = at(400.0);
-  disabled.enable = false;
+  disabled.permission.enable = false;
   for (int i = 0; i < 10; ++i) {
     const auto output = path.step(disabled);
     EXPECT_FALSE(output.controlling);
@@ -298,7 +298,7 @@ TEST(ControlPath, TakesOverAndGivesBackWithoutAJump) {
   int before = 100;
   for (int i = 0; i < 400; ++i) {
     auto input = at(plant.force_n());
-    input.enable = i >= 100 && i < 300;
+    input.permission.enable = i >= 100 && i < 300;
     const auto output = path.step(input);
     EXPECT_LE(std::abs(output.override_pct - before), 3) << i;
     if (i == 100) {
@@ -382,7 +382,7 @@ TEST(ControlPath, NeverLeavesItsLimitsNorRisesBlindlyUnderRandomInput) {
     }
     input.override_reported = random() % 3 == 0;
     input.override_reported_pct = host_tests::any_float(random);
-    input.enable = i / 1000 % 7 != 0;
+    input.permission.enable = i / 1000 % 7 != 0;
 
     resumed.restore(path.state());
     const auto output = path.step(input);

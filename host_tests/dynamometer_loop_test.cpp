@@ -63,7 +63,7 @@ TEST(DynamometerLoop, AnswersEveryForceByOneTick) {
                                      .spindle_ratio = 1.0F,
                                      .force_valid = true,
                                      .override_reported = false,
-                                     .enable = true,
+                                     .permission = control::kEverything,
                                      .part_start = false});
     ASSERT_EQ(loop.command().override_pct, expected.override_pct) << k;
     plant.step(loop.command().override_pct, k < 40 ? 0.0 : 1.0);

@@ -17,6 +17,7 @@
 #include "firmware/parameter_table.hpp"
 #include "support/allocation_count.hpp"
 #include "support/cutting_plant.hpp"
+#include "support/enabled.hpp"
 #include "support/random_float.hpp"
 
 namespace cutforce::control {
@@ -179,7 +180,7 @@ struct Machine {
                         .spindle_ratio = 1.0F,
                         .force_valid = valid,
                         .override_reported = false,
-                        .enable = enable,
+                        .permission = host_tests::enabled(enable),
                         .part_start = false});
     const double force_n = plant.step(output.override_pct, depth_mm);
     highest_n = std::max(highest_n, force_n);
@@ -299,7 +300,7 @@ TEST(ControlPath, StaysWithinItsLimitsWhicheverLawIsChosen) {
          .spindle_ratio = 0.1F + 0.01F * static_cast<float>(random() % 990),
          .force_valid = good || random() % 2 == 0,
          .override_reported = random() % 3 == 0,
-         .enable = i / 1000 % 7 != 0,
+         .permission = host_tests::enabled(i / 1000 % 7 != 0),
          .part_start = random() % 200 == 0});
     ASSERT_GE(machine.output.override_pct, 20) << i;
     ASSERT_LE(machine.output.override_pct, 200) << i;

@@ -62,6 +62,8 @@ class TomlSection {
                                                   std::int64_t maximum);
   [[nodiscard]] std::optional<bool> flag(std::string_view key);
   [[nodiscard]] std::optional<std::string> text(std::string_view key);
+  // One text, or several in [ ].
+  [[nodiscard]] std::optional<std::vector<std::string>> texts(std::string_view key);
   // Position of the name within `names`.
   [[nodiscard]] std::optional<std::size_t> choice(std::string_view key,
                                                   std::span<const std::string_view> names);

@@ -255,6 +255,28 @@ std::optional<std::string> TomlSection::text(std::string_view key) {
   return value;
 }
 
+std::optional<std::vector<std::string>> TomlSection::texts(std::string_view key) {
+  Access access(*this);
+  const toml::node* node = access.look_up(*this, key);
+  if (node == nullptr) return std::nullopt;
+  std::vector<std::string> values;
+  const auto take = [&](const toml::node& element) {
+    const auto value = element.is_string() ? element.value<std::string>() : std::nullopt;
+    if (value) {
+      values.push_back(*value);
+    } else {
+      access.refuse_type(key, element, "text", "write each text in double quotes");
+    }
+    return value.has_value();
+  };
+  const toml::array* array = node->as_array();
+  if (array == nullptr) return take(*node) ? std::optional{values} : std::nullopt;
+  for (const toml::node& element : *array) {
+    if (!take(element)) return std::nullopt;
+  }
+  return values;
+}
+
 std::optional<std::size_t> TomlSection::choice(std::string_view key,
                                                std::span<const std::string_view> names) {
   Access access(*this);

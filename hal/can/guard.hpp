@@ -9,7 +9,14 @@
 //
 // What follows the last accepted frame by one is accepted. A repeated counter is refused. A counter
 // that jumps is refused as well, and so is what follows it, until kTrust frames in a row follow
-// one another: one stray or replayed frame among the sound ones disturbs nothing.
+// one another: one stray or replayed frame among the sound ones disturbs nothing. A repeated frame
+// leaves everything as it was.
+//
+// What a replay can do: any of the last 255 frames, alone or by twos between two live frames, is
+// refused, and the live frames go on being taken. But a frame of 256 frames ago has the next
+// counter and is taken in place of the live one; and kTrust successive old frames, while the live
+// node is silent or between two of its frames, are taken as the node itself. An 8-bit counter
+// cannot tell them from it: who can send on the bus has to be trusted.
 #pragma once
 
 #include <cstdint>

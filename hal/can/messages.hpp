@@ -47,7 +47,7 @@ struct Override {
   std::uint8_t state;                        // control::SupervisorState, 0..15
   std::uint8_t reason;                       // control::Reason, 0..15: the group of the cause
   std::optional<float> force_n;              // steps of 0.5 N
-  bool enabled;                              // the override is the controller's
+  bool enabled;  // to be followed: in control, and after a fault until it is acknowledged
   bool saturated_low;
   bool saturated_high;
   bool in_cut;
@@ -100,11 +100,11 @@ struct MachineState {
 
 // What is not given stays as the machine file has it.
 struct Job {
-  std::optional<float> force_reference_n;   // steps of 4 N, to 16376 N
+  std::optional<float> force_reference_n;   // steps of 4 N, to 16380 N
   std::optional<float> force_limit_ratio;   // of the reference: 1.01..3.55
   std::optional<std::uint8_t> floor_pct;    // steps of 10, 0..140
   std::optional<std::uint8_t> ceiling_pct;  // steps of 10, 0..250
-  std::optional<float> diameter_m;          // of workpiece or tool; steps of 0.5 mm, to 1.023 m
+  std::optional<float> diameter_m;          // of workpiece or tool; steps of 0.5 mm, to 1.0235 m
 };
 
 // One sample of the acquisition node: two voltages, two line currents, and an 8-bit count of
@@ -136,7 +136,27 @@ struct Spindle {
 [[nodiscard]] Frame pack(const Job& message, std::uint8_t node, std::uint8_t counter) noexcept;
 
 // From a frame whose identifier is the message's. Guarded frames: after the guard let them pass.
+// Bits that the DBC leaves spare are not looked at (layout.hpp says why).
 template <class Message>
 [[nodiscard]] std::expected<Message, FrameError> unpack(const Frame& frame) noexcept;
+
+template <>
+std::expected<Override, FrameError> unpack(const Frame& frame) noexcept;
+template <>
+std::expected<Estimate, FrameError> unpack(const Frame& frame) noexcept;
+template <>
+std::expected<Diagnostics, FrameError> unpack(const Frame& frame) noexcept;
+template <>
+std::expected<Emergency, FrameError> unpack(const Frame& frame) noexcept;
+template <>
+std::expected<Heartbeat, FrameError> unpack(const Frame& frame) noexcept;
+template <>
+std::expected<MachineState, FrameError> unpack(const Frame& frame) noexcept;
+template <>
+std::expected<Job, FrameError> unpack(const Frame& frame) noexcept;
+template <>
+std::expected<Phases, FrameError> unpack(const Frame& frame) noexcept;
+template <>
+std::expected<Spindle, FrameError> unpack(const Frame& frame) noexcept;
 
 }  // namespace cutforce::hal::can

@@ -2,9 +2,24 @@
 // unwrapped, times the period; when a frame was received only tells how often the count has
 // wrapped. So what the loop sees does not depend on when the board was awake.
 //
+//   advance = the number that fits the count's 8 bits and is nearest to the time that went by
+//   time    = (sum of the advances) * period
+//
+// The time that went by is taken from the smoothed time of receipt, which no single late frame
+// moves much. So frames may come up to 100 samples earlier or later than that. A frame whose count
+// follows the last one by one may come 200 late or early, which is what the first frames need while
+// nothing is smoothed yet. A silence is known to 256 samples, as the two clocks drift against each
+// other: by 128 samples in 20 minutes at 1 kHz and 100 ppm.
+//
+// Time never goes back. When the node starts anew its count jumps to 0: seen over a silence of more
+// than 128 samples that is a gap of about the right length; seen at once, either a gap of up to 128
+// samples, or up to 128 samples are dropped as late until the count has caught up. Where it happens
+// to go on by one within 200 samples, no gap is seen.
+//
 // A Spindle frame goes with the Phases frame of the same count, which the node sends after it; one
-// that comes late goes with the next sample, and one that is older than that with none. A gap in
-// the count is lost samples: they are counted, and the loop's own gate sees the gap in time.
+// that comes late goes with the next sample, and one that is older than that with none, nor one
+// that waited over a gap of 128 samples. A gap in the count is lost samples: they are counted, and
+// the loop's own gate sees the gap in time.
 #pragma once
 
 #include <array>
@@ -40,16 +55,15 @@ class SampleAssembler {
 
   struct State {
     std::int64_t count = 0;        // of the last sample, unwrapped
-    std::int64_t received_ns = 0;  // of the last sample
+    std::int64_t expected_ns = 0;  // receipt of the last sample, smoothed
     std::uint32_t started = 0;
-    std::uint32_t lost = 0;      // samples missing in the count, since the start
-    std::uint32_t repeated = 0;  // samples that came twice, or late, and were dropped
+    std::uint32_t lost = 0;             // samples missing in the count, since the start
+    std::uint32_t repeated = 0;         // samples that came twice, or late, and were dropped
+    std::uint32_t spindle_present = 0;  // 1: a Spindle frame waits for its sample
     std::uint32_t spindle_count = 0;
-    std::uint32_t spindle_present = 0;
+    std::uint32_t spindle_signals = 0;  // bit(Signal) of each value that it has
     float speed_rad_s = 0.0F;
     float power_meter_w = 0.0F;
-    std::uint32_t speed_present = 0;
-    std::uint32_t meter_present = 0;
   };
 
   // Fails iff check() does.
@@ -65,7 +79,14 @@ class SampleAssembler {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
+  static constexpr std::int64_t kLateCounts = 200;  // of a frame that follows the last by one
+  static constexpr std::int64_t kSmoothing = 64;    // frames
+
   explicit SampleAssembler(const Config& config) noexcept : config_(config) {}
+
+  [[nodiscard]] std::int64_t advance(std::uint8_t count, std::int64_t received_ns) const noexcept;
+  void put_phases(const Phases& phases, Sample& sample) const noexcept;
+  void put_spindle(std::uint8_t count, Sample& sample) noexcept;
 
   Config config_;
   State state_{};

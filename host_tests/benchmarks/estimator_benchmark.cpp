@@ -176,7 +176,7 @@ const Body kControlTick{
                                         .spindle_ratio = 1.0F,
                                         .force_valid = true,
                                         .override_reported = true,
-                                        .enable = true,
+                                        .permission = control::kEverything,
                                         .part_start = false};
       return [path, input]() mutable {
         forget(input);

@@ -33,6 +33,11 @@ TEST(CoreSymbols, OfTheControllersNeedNobodyElse) {
   EXPECT_EQ(result.exit_status, 0) << result.output;
 }
 
+TEST(CoreSymbols, OfTheBusNeedNobodyElse) {
+  const auto result = gate(" " + quoted(CUTFORCE_CAN_ARCHIVE));
+  EXPECT_EQ(result.exit_status, 0) << result.output;
+}
+
 TEST(CoreSymbols, OfTheLoopNeedOnlyTheEstimatorAndTheControllers) {
   const auto result =
       gate(" " + quoted(CUTFORCE_FIRMWARE_ARCHIVE) + " " + quoted(CUTFORCE_ESTIMATOR_ARCHIVE) +

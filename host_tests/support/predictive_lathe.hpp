@@ -113,7 +113,7 @@ inline std::vector<LatheTick> cut(PredictivePath& path, const hal::host::ForceMa
                                    .spindle_ratio = static_cast<float>(speed),
                                    .force_valid = true,
                                    .override_reported = false,
-                                   .enable = true,
+                                   .permission = control::kEverything,
                                    .part_start = ticks.empty()});
     machine.set_override(output.override_pct);
     double peak_n = 0.0;

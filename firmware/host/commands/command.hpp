@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "firmware/host/bench/bench_ports.hpp"
 #include "hal/host/input_error.hpp"
 
 namespace CLI {
@@ -37,9 +38,11 @@ void add_hash(CLI::App& program, Action& action);
 void add_embed(CLI::App& program, Action& action);
 void add_tune(CLI::App& program, Action& action);
 void add_compare(CLI::App& program, Action& action);
+void add_cnc(CLI::App& program, Action& action, const BenchPorts& ports);
 
-// The whole program. Exit status as Exit; 128 + n where signal n ended it.
-[[nodiscard]] int run_program(int argc, const char* const* argv);
+// The whole program. Exit status as Exit; 128 + n where signal n ended it. `ports`: what `cnc` may
+// open; a composition root that knows an operating system's ports gives them.
+[[nodiscard]] int run_program(int argc, const char* const* argv, const BenchPorts& ports = {});
 
 // To standard error, each with its remedy.
 void show_errors(std::span<const hal::host::InputError> errors);

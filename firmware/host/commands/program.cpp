@@ -87,7 +87,7 @@ Exit refuse(std::span<const hal::host::InputError> errors) {
   return Exit::kBadInput;
 }
 
-int run_program(int argc, const char* const* argv) {
+int run_program(int argc, const char* const* argv, const BenchPorts& ports) {
   CLI::App program{
       "Cutting force from the spindle motor's voltages and currents, held by the feed "
       "override.",
@@ -101,6 +101,7 @@ int run_program(int argc, const char* const* argv) {
         add_reproduce, add_compare, add_tune, add_convert, add_hash, add_embed}) {
     add(program, action);
   }
+  add_cnc(program, action, ports);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

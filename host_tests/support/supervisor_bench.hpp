@@ -1,0 +1,96 @@
+// A supervisor with everything around it in order, and a person who presses buttons.
+#pragma once
+
+#include "control/supervisor.hpp"
+
+namespace cutforce::host_tests {
+
+// Times of a few steps, so that a test sees each of them end.
+inline constexpr control::Supervisor::Config kSupervised{
+    .period_s = 0.001F,
+    .mode = control::SupervisorMode::kControl,
+    .link_required = true,
+    .neutral_pct = 100.0F,
+    .fallback_pct = 70.0F,
+    .hold_pct = 0.0F,
+    .fall_pct_s = 5.0F,
+    .link_timeout_s = 0.25F,
+    .samples_timeout_s = 0.2F,
+    .estimate_timeout_s = 2.0F,
+    .hold_release_s = 0.5F,
+    .overrun_window_s = 1.0F,
+    .overrun_ratio = 0.01F,
+};
+static_assert(kSupervised.check());
+
+// Spindle at speed, in the cut, the controller at 80 %; nobody has pressed anything.
+[[nodiscard]] constexpr control::Supervisor::Input sound_input() {
+  return {.self_test_done = true,
+          .self_test_passed = true,
+          .checks_passed = true,
+          .output_failed = false,
+          .foreign = false,
+          .stop = false,
+          .missed_ticks = 0,
+          .machine_state_new = true,
+          .bus_down = false,
+          .arm = false,
+          .control = false,
+          .reset = false,
+          .inhibit = false,
+          .threading = false,
+          .spindle_at_speed = true,
+          .feeding = true,
+          .sample_new = true,
+          .signals_refused = false,
+          .reversed = false,
+          .force_new = true,
+          .force_n = 400.0F,
+          .force_limit_n = 1000.0F,
+          .override_pct = 80};
+}
+
+struct SupervisorBench {
+  control::Supervisor supervisor;
+  control::Supervisor::Input input = sound_input();
+  control::Supervisor::Output output{};
+
+  explicit SupervisorBench(const control::Supervisor::Config& config = kSupervised)
+      : supervisor(control::Supervisor::make(config).value()) {}
+
+  control::SupervisorState step(int steps = 1) {
+    for (int i = 0; i < steps; ++i) output = supervisor.step(input);
+    return output.state;
+  }
+  // By the way a person takes. The controller is at neutral until it has control.
+  control::SupervisorState lead_to(control::SupervisorState goal) {
+    using enum control::SupervisorState;
+    input.override_pct = 100;
+    if (goal == kBoot) return kBoot;
+    step();
+    if (goal == kSelfTest) return output.state;
+    step();
+    if (goal == kCheck) return output.state;
+    step(2);
+    if (goal == kReady) return output.state;
+    input.arm = true;
+    step(2);
+    if (goal == kMonitor) return output.state;
+    input.control = true;
+    step();
+    input.override_pct = 80;
+    step();
+    if (goal == kControl) return output.state;
+    if (goal == kHold) input.inhibit = true;
+    if (goal == kLinkLost) input.bus_down = true;
+    if (goal == kProtect) input.force_n = 3000.0F;
+    if (goal == kSafe) input.output_failed = true;
+    if (goal == kDead) input.stop = true;
+    step(2);
+    input.inhibit = input.bus_down = input.output_failed = input.stop = false;
+    input.force_n = 400.0F;
+    return output.state;
+  }
+};
+
+}  // namespace cutforce::host_tests
