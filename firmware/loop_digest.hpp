@@ -49,6 +49,9 @@ class LoopDigest {
     trace_.take(static_cast<std::uint8_t>(o.source));
     trace_.take(static_cast<std::uint8_t>(o.state));
     trace_.take(static_cast<std::uint8_t>(o.control_tick));
+    trace_.take(static_cast<std::uint8_t>(o.doubtful));
+    trace_.take(static_cast<std::uint8_t>(o.saturated_low));
+    trace_.take(static_cast<std::uint8_t>(o.saturated_high));
   }
   constexpr void take(const hal::Command& command) noexcept {
     ++commands_;

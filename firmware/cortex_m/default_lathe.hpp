@@ -124,6 +124,17 @@ inline constexpr Machine kMachine = [] {
   m.mrac_state_scale_ratio = 0x1.a66666p+2F;
   m.mrac_state_gain_ratio = 0x1.2p+4F;
   m.mrac_feed_mm_s_pct = 0x1.47ae14p-5F;
+  m.supervisor_mode = static_cast<decltype(m.supervisor_mode)>(0);  // advise
+  m.link_required = true;
+  m.fallback_pct = 0x1.18p+6F;
+  m.hold_pct = 0x0p+0F;
+  m.fall_pct_s = 0x1.4p+2F;
+  m.link_timeout_s = 0x1p-2F;
+  m.samples_timeout_s = 0x1.99999ap-3F;
+  m.estimate_timeout_s = 0x1p+1F;
+  m.hold_release_s = 0x1p-1F;
+  m.overrun_window_s = 0x1p+0F;
+  m.overrun_ratio = 0x1.47ae14p-7F;
   return m;
 }();
 // clang-format on

@@ -27,7 +27,7 @@ BOUNDED = {
     "std::__introsort_loop": "recurses above 16 elements only; the controllers sort fewer",
 }
 
-DEFAULT_ROOTS = ("image_main", "ControlLoop::step", "make_the_loop")
+DEFAULT_ROOTS = ("image_main", "run_board", "ControlLoop::step", "ControlLoop::make")
 
 
 class Graph:
