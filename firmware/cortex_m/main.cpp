@@ -90,7 +90,7 @@ void report(const BoardOutput& output, std::uint32_t missed) {
   console::write("\n");
 }
 
-[[noreturn]] void run_board(Board& board) {
+[[noreturn, gnu::noinline]] void run_board(Board& board) {
   CmsdkTimer<MappedRegisters> timer{MappedRegisters{kBoard.timer}, kBoard.clock_hz};
   timer.start();
   Pins pins{MappedRegisters{kBoard.pins}, TimerWait{timer}, kPins};

@@ -30,9 +30,10 @@ class Meter {
   template <class Body>
   [[nodiscard]] std::uint32_t count(Body&& body) noexcept {
     constexpr std::uint32_t kNops = 4000;
-    const std::uint32_t used = ticks(body) - empty_ticks_;
-    return static_cast<std::uint32_t>((std::uint64_t{used} * kNops + ticks_for_nops_ / 2) /
-                                      ticks_for_nops_);
+    const std::uint32_t used = ticks(body);
+    if (used <= empty_ticks_) return 0;  // a reading may be one tick off
+    return static_cast<std::uint32_t>(
+        (std::uint64_t{used - empty_ticks_} * kNops + ticks_for_nops_ / 2) / ticks_for_nops_);
   }
 
  private:

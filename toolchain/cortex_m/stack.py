@@ -156,7 +156,7 @@ class Search:
 
     def named(self, part):
         """Linked functions whose shown name has this part."""
-        found = [n for n in self.graph.own if n in self.image.values and
+        found = [n for n in self.graph.own if n.rpartition(":")[2] in self.image.values and
                  (n == part or re.search(rf"\b{re.escape(part)}\(", self.text(n)))]
         return found
 
