@@ -1,8 +1,8 @@
 // The stack: how deep it has been, and the guard below it.
 //
-// It lies at the begin of RAM (sections.ld). The guard is a region of the MPU over the 64 KiB below,
-// which costs no memory: what overflows the stack, by a word or by a large frame, is stopped there,
-// and the fault handler names it.
+// It lies at the begin of RAM (sections.ld). The guard is a region of the MPU over the 64 KiB
+// below, which costs no memory: what overflows the stack, by a word or by a large frame, is stopped
+// there, and the fault handler names it.
 #pragma once
 
 #include <cstddef>
