@@ -32,7 +32,7 @@ Supervisor::Supervisor(const Config& config) noexcept
       samples_steps_(steps(config.samples_timeout_s)),
       estimate_steps_(steps(config.estimate_timeout_s)),
       release_steps_(steps(config.hold_release_s)),
-      window_part_steps_(std::max(steps(config.overrun_window_s) / 8, 1U)),
+      window_part_steps_(std::max<std::uint32_t>(steps(config.overrun_window_s) / 8, 1U)),
       missed_most_(config.overrun_ratio * static_cast<float>(steps(config.overrun_window_s))) {
   state_ = {.state = S::kBoot,
             .reason = Reason::kNone,
@@ -55,7 +55,7 @@ Supervisor::Supervisor(const Config& config) noexcept
 }
 
 std::uint32_t Supervisor::steps(float time_s) const noexcept {
-  return std::max(static_cast<std::uint32_t>(time_s / config_.period_s + 0.5F), 1U);
+  return std::max<std::uint32_t>(static_cast<std::uint32_t>(time_s / config_.period_s + 0.5F), 1U);
 }
 
 // The fall of a latched state, from its beginning.

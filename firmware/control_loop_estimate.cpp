@@ -36,6 +36,9 @@ bool doubtful(estimator::FaultSet faults) noexcept {
   out.source = Source::kNone;
   out.state = LoopState::kStarting;
   out.control_tick = false;
+  out.doubtful = false;
+  out.saturated_low = false;
+  out.saturated_high = false;
 }
 
 }  // namespace

@@ -14,19 +14,9 @@
 #include <utility>
 #include <vector>
 
+#include "host_tests/benchmarks/keep.hpp"
+
 namespace cutforce::benchmarks {
-
-// The compiler must take `value` for used.
-template <class T>
-void keep(const T& value) {
-  asm volatile("" : : "r,m"(value) : "memory");
-}
-
-// The compiler must take `value` for changed: nothing about it can be computed beforehand.
-template <class T>
-void forget(T& value) {
-  asm volatile("" : "+m"(value) : : "memory");
-}
 
 class Body {
  public:

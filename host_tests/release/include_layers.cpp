@@ -129,7 +129,7 @@ constexpr auto kLayers = std::to_array<Layer>({
      Layer::kLibraries,
      Layer::kFileCalls,
      {"estimator/", "control/", "hal/port.hpp", "hal/can_port.hpp", "hal/byte_port.hpp",
-      "hal/sample_source.hpp", "hal/can/", "hal/host/"}},
+      "hal/sample_source.hpp", "hal/sample_stream.hpp", "hal/can/", "hal/host/"}},
     // The service reads the same machine files as the host program and writes the same traces.
     {"firmware/linux/",
      Layer::kAllStandard,
@@ -144,7 +144,7 @@ constexpr auto kLayers = std::to_array<Layer>({
      Layer::kNoLibraries,
      Layer::kNoSystem,
      {"estimator/", "control/", "hal/port.hpp", "hal/can_port.hpp", "hal/byte_port.hpp",
-      "hal/sample_source.hpp", "hal/can/", "hal/cortex_m/"}},
+      "hal/sample_source.hpp", "hal/sample_stream.hpp", "hal/can/", "hal/cortex_m/"}},
 });
 
 const Layer* layer_of(std::string_view path) {

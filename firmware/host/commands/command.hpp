@@ -34,6 +34,8 @@ void add_lockstep(CLI::App& program, Action& action);
 void add_evaluate(CLI::App& program, Action& action);
 void add_reproduce(CLI::App& program, Action& action);
 void add_convert(CLI::App& program, Action& action);
+void add_hash(CLI::App& program, Action& action);
+void add_embed(CLI::App& program, Action& action);
 void add_tune(CLI::App& program, Action& action);
 void add_compare(CLI::App& program, Action& action);
 void add_cnc(CLI::App& program, Action& action, const BenchPorts& ports);

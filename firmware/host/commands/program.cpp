@@ -96,8 +96,9 @@ int run_program(int argc, const char* const* argv, const BenchPorts& ports) {
   program.require_subcommand(1);
   program.set_version_flag("--version", CUTFORCE_VERSION);
   Action action;
-  for (const auto add : {add_demo, add_simulate, add_replay, add_evaluate, add_check, add_report,
-                         add_lockstep, add_reproduce, add_compare, add_tune, add_convert}) {
+  for (const auto add :
+       {add_demo, add_simulate, add_replay, add_evaluate, add_check, add_report, add_lockstep,
+        add_reproduce, add_compare, add_tune, add_convert, add_hash, add_embed}) {
     add(program, action);
   }
   add_cnc(program, action, ports);

@@ -1,0 +1,237 @@
+// The image that counts: instructions of every block, over the cut of a sample stream and over a
+// scripted cut for the controllers. A line each: name, mean, and most of any call.
+//   meter STREAM     a motor's signals at 5 kHz (toolchain/cortex_m/count.sh makes it)
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <new>
+#include <span>
+#include <string_view>
+
+#include "firmware/configuration.hpp"
+#include "hal/cortex_m/console.hpp"
+#include "hal/cortex_m/meter.hpp"
+#include "hal/cortex_m/semihosting.hpp"
+#include "hal/cortex_m/stream_port.hpp"
+#include "host_tests/benchmarks/target_bodies.hpp"
+
+namespace cutforce::benchmarks {
+namespace {
+
+namespace console = hal::cortex_m::console;
+using firmware::ControlLoop;
+using firmware::EstimatorName;
+using hal::cortex_m::Meter;
+using hal::cortex_m::StreamPort;
+
+constinit std::array<char, 512> line{};
+constinit firmware::Machine machine{};
+
+class Counts {
+ public:
+  void add(std::uint32_t count) noexcept {
+    sum_ += count;
+    most_ = count > most_ ? count : most_;
+    ++calls_;
+  }
+  void show(std::string_view name) const noexcept {
+    if (calls_ == 0) return;
+    console::write(name);
+    console::write(" ");
+    console::write_number(static_cast<std::uint32_t>((sum_ + calls_ / 2) / calls_));
+    console::write(" ");
+    console::write_number(most_);
+    console::write("\n");
+  }
+
+ private:
+  std::uint64_t sum_ = 0;
+  std::uint32_t most_ = 0;
+  std::uint32_t calls_ = 0;
+};
+
+// What is too large for a stack, one after the other in one place.
+template <class T>
+class Place {
+ public:
+  template <class... Arguments>
+  T& make(Arguments&&... arguments) noexcept {
+    return *new (bytes_.data()) T(static_cast<Arguments&&>(arguments)...);
+  }
+
+ private:
+  alignas(T) std::array<std::byte, sizeof(T)> bytes_{};
+};
+
+void show_calibration(Meter& meter) {
+  Counts empty;
+  Counts nops;
+  for (int k = 0; k < 1000; ++k) {
+    empty.add(meter.count([] {}));
+    nops.add(meter.count([] { asm volatile(".rept 100\n\tnop\n\t.endr"); }));
+  }
+  empty.show("empty");
+  nops.show("nop_100");
+}
+
+// Seconds of the stream that are run in and not counted, and that are.
+constexpr std::uint32_t kRunIn = 15'000;
+constexpr std::uint32_t kCounted = 20'000;
+constexpr std::uint32_t kSamplesPerTick = 5;
+
+template <class Step>
+bool over_stream(std::string_view name, const Step& step) {
+  auto port = StreamPort::open(name, std::as_writable_bytes(std::span(&machine, 1)));
+  if (!port) return false;
+  std::array<hal::Sample, 1> block{};
+  for (std::uint32_t k = 0; k < kRunIn + kCounted; ++k) {
+    const auto count = port->read(block);
+    if (!count || *count == 0) return false;
+    step(block[0], k >= kRunIn, k);
+  }
+  return true;
+}
+
+bool count_samples(Meter& meter, std::string_view stream, const ControlLoop::Config& config) {
+  static constinit Place<AirGapSample> air_gap_place{};
+  static constinit Place<FusedSample> fused_place{};
+  auto& air_gap = air_gap_place.make(config);
+  auto& fused = fused_place.make(config);
+  Counts power;
+  Counts sample;
+  Counts tick;
+  const bool read = over_stream(stream, [&](const hal::Sample& s, bool counted, std::uint32_t k) {
+    const std::uint32_t a = meter.count([&] { air_gap.step(s); });
+    const std::uint32_t b = meter.count([&] { fused.step(s); });
+    if (counted) power.add(a), sample.add(b);
+    if (k % kSamplesPerTick != kSamplesPerTick - 1) return;
+    const std::uint32_t c = meter.count([&] { fused.tick(); });
+    if (counted) tick.add(c);
+  });
+  power.show("raw_air_gap_power");
+  sample.show("raw_fused");
+  tick.show("tick_fused");
+  return read;
+}
+
+struct LoopNames {
+  EstimatorName estimator;
+  std::string_view raw;
+  std::string_view tick;
+  std::string_view control;
+};
+constexpr std::array<LoopNames, 4> kLoops{{
+    {EstimatorName::kFused, "loop_fused_raw", "loop_fused_tick", "loop_fused_control"},
+    {EstimatorName::kSynthesized, "loop_synthesized_raw", "loop_synthesized_tick",
+     "loop_synthesized_control"},
+    {EstimatorName::kComputed, "loop_computed_raw", "loop_computed_tick", "loop_computed_control"},
+    {EstimatorName::kMeasured, "loop_measured_raw", "loop_measured_tick", "loop_measured_control"},
+}};
+
+bool count_loop(Meter& meter, std::string_view stream, const LoopNames& names) {
+  using Made = std::expected<ControlLoop, ControlLoop::ConfigError>;
+  static constinit Place<Made> place{};
+  firmware::Machine chosen = machine;
+  chosen.estimator = names.estimator;
+  auto& made = place.make(ControlLoop::make(*firmware::make_loop_config(chosen)));
+  if (!made) return false;
+  Counts raw;
+  Counts tick;
+  Counts control;
+  const bool read = over_stream(stream, [&](const hal::Sample& s, bool counted, std::uint32_t) {
+    std::optional<firmware::LoopOutput> output;
+    const std::uint32_t count = meter.count([&] { output = made->step(s); });
+    if (!counted) return;
+    (!output ? raw : output->control_tick ? control : tick).add(count);
+  });
+  raw.show(names.raw);
+  tick.show(names.tick);
+  control.show(names.control);
+  return read;
+}
+
+template <class Body>
+void count_script(Meter& meter, Body& body, std::string_view name) {
+  Counts counts;
+  for (std::uint32_t tick = 0; tick < kScriptTicks; ++tick) {
+    body.prepare(tick);
+    counts.add(meter.count([&] { body.step(); }));
+  }
+  counts.show(name);
+}
+
+// Calm: the second half of each stretch of the script, where no gain has changed for a while.
+void count_predictive(Meter& meter, const control::Predictive::Config& config) {
+  static constinit Place<PredictiveTick> place{};
+  auto& law = place.make(config);
+  Counts calm;
+  Counts all;
+  for (std::uint32_t tick = 0; tick < kScriptTicks; ++tick) {
+    law.prepare(tick);
+    const std::uint32_t count = meter.count([&] { law.step(); });
+    all.add(count);
+    if (tick % 60 >= 40 && tick / 60 % 10 != 0 && tick / 60 % 10 != 9) calm.add(count);
+  }
+  calm.show("predictive_calm");
+  all.show("predictive");
+}
+
+void count_controllers(Meter& meter, const control::ControlPath::Config& config) {
+  constexpr std::array<std::string_view, control::kLawCount> kNames{
+      "control_pi",        "control_pid",           "control_pole_assignment",
+      "control_mrac",      "control_variable_gain", "control_fuzzy",
+      "control_predictive"};
+  static constinit Place<ControlTick> place{};
+  for (std::size_t k = 0; k < kNames.size(); ++k) {
+    auto& path = place.make(config, static_cast<control::LawName>(k));
+    count_script(meter, path, kNames[k]);
+  }
+  PiTick pi(config.law.pi);
+  count_script(meter, pi, "pi_step");
+  count_predictive(meter, config.law.predictive);
+}
+
+void count_small(Meter& meter) {
+  SpaceVectorPower power;
+  GuardedFrame frame;
+  Counts powers;
+  Counts frames;
+  for (int k = 0; k < 1000; ++k) {
+    estimator::MotorSample sample{.voltage_v = {.alpha = 200.0F, .beta = 100.0F},
+                                  .current_a = {.alpha = 4.0F, .beta = 3.0F}};
+    forget(sample);
+    powers.add(meter.count([&] { power.step(sample); }));
+    frames.add(meter.count([&] { frame.step(); }));
+    keep(power);
+    keep(frame);
+  }
+  powers.show("space_vector_power");
+  frames.show("guarded_frame");
+}
+
+int count_all() {
+  const std::string_view stream = hal::cortex_m::semihosting::command_line(line);
+  if (!StreamPort::open(stream, std::as_writable_bytes(std::span(&machine, 1)))) {
+    console::write("the stream cannot be read\n");
+    return 1;
+  }
+  const auto config = firmware::make_loop_config(machine);
+  auto paths = machine;
+  paths.estimator = EstimatorName::kSynthesized;
+  const auto path_config = firmware::make_loop_config(paths);
+  if (!config || !path_config) return 1;
+  Meter meter;
+  show_calibration(meter);
+  count_small(meter);
+  bool sound = count_samples(meter, stream, *config);
+  for (const LoopNames& names : kLoops) sound = count_loop(meter, stream, names) && sound;
+  count_controllers(meter, config->controller);
+  return sound ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace cutforce::benchmarks
+
+extern "C" int image_main() {
+  cutforce::hal::cortex_m::semihosting::exit(cutforce::benchmarks::count_all());
+}

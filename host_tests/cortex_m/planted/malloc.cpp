@@ -1,0 +1,3 @@
+#include <cstdlib>
+
+extern "C" void* planted(unsigned size) { return std::malloc(size); }

@@ -1,0 +1,1 @@
+extern "C" int* planted(unsigned size) { return new int[size]; }

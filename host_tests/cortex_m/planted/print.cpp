@@ -1,0 +1,3 @@
+#include <cstdio>
+
+extern "C" int planted(int value) { return std::printf("%d", value); }
