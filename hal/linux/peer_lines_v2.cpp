@@ -114,8 +114,9 @@ auto PeerLines::open(const GpioConfig& config) -> std::expected<PeerLines, OpenE
   if (!chosen) return std::unexpected{chosen.error()};
   const Owned<gpiod_chip> chip{gpiod_chip_open(chosen->path.c_str())};
   if (!chip) return std::unexpected{line_refused(config, {"the chip", 0}, "", "", errno)};
-  auto impl = std::make_unique<Impl>(Impl{config, request(chip.get(), config), {}});
-  if (!impl->request) return std::unexpected{why_refused(chip.get(), config, errno)};
+  auto requested = request(chip.get(), config);
+  if (!requested) return std::unexpected{why_refused(chip.get(), config, errno)};
+  auto impl = std::make_unique<Impl>(Impl{config, std::move(requested), {}});
   impl->events.reset(gpiod_edge_event_buffer_new(kMostEvents));
   if (!impl->events) return std::unexpected{line_refused(config, {"the chip", 0}, "", "", errno)};
   return PeerLines{std::move(impl)};
