@@ -4,7 +4,8 @@
 // A program is no latch: it looks at the data lines some time after the edge. It believes them
 //   at once   if the edge, by the kernel's stamp, is at most kFresh_ns old when they have been
 //             read; the board leaves the data alone until its next byte, a control period later
-//   else      as a PLC does: if two readings in a row are equal and no strobe came in between
+//   else      as a PLC does: if it reads the same kRest_ns later or more, no other value and no
+//             strobe in between; a program that makes up for lost time looks twice at once
 // So a program that was held up takes no half-written byte, unless the board was held up for as
 // long in the midst of writing, and then the strobe that follows corrects it. Of strobes that come
 // between two calls the last one's byte is delivered, the others are lost.
@@ -50,6 +51,8 @@ class ByteLatch {
  public:
   // Two periods of 1 ms of the program that calls; below any control period that is in use.
   static constexpr std::int64_t kFresh_ns = 2'000'000;
+  // Twenty times what a board takes to write eight lines.
+  static constexpr std::int64_t kRest_ns = 1'000'000;
 
   ByteLatch(Lines lines, Clock clock) noexcept
       : lines_(std::move(lines)), clock_(std::move(clock)) {}
@@ -103,10 +106,13 @@ class ByteLatch {
   }
 
   bool believes(std::uint8_t byte) noexcept {
-    const bool fresh = clock_() - strobe_ns_ <= kFresh_ns;
-    if (!fresh && last_ != byte) {
-      last_ = byte;
-      return false;
+    const std::int64_t now_ns = clock_();
+    if (now_ns - strobe_ns_ > kFresh_ns) {
+      if (last_ != byte) {
+        last_ = byte;
+        last_ns_ = now_ns;
+      }
+      if (now_ns - last_ns_ < kRest_ns) return false;
     }
     strobed_ = false;
     return true;
@@ -115,7 +121,8 @@ class ByteLatch {
   Lines lines_;
   Clock clock_;
   std::int64_t strobe_ns_ = 0;
-  std::optional<std::uint8_t> last_{};  // read too late, and not yet believed
+  std::int64_t last_ns_ = 0;
+  std::optional<std::uint8_t> last_{};  // read too late, and not yet believed; since last_ns_
   bool strobed_ = false;                // and the byte not yet delivered
   bool started_ = false;
 };
