@@ -51,7 +51,7 @@ class ByteLatch {
  public:
   // Two periods of 1 ms of the program that calls; below any control period that is in use.
   static constexpr std::int64_t kFresh_ns = 2'000'000;
-  // Twenty times what a board takes to write eight lines.
+  // Long against the writing of eight lines by a board that is not held up.
   static constexpr std::int64_t kRest_ns = 1'000'000;
 
   ByteLatch(Lines lines, Clock clock) noexcept
