@@ -93,8 +93,8 @@ class TheCncsEndOfTheLines(unittest.TestCase):
             self.assertEqual(told["figures"]["bytes"], len(wanted))
             self.assertEqual(told["figures"]["invalid_bytes"], 0)
             self.assertEqual(told["figures"]["silences"], 0)
-            print(f"FIGURE lines_bytes_taken {len(followed)} bytes")
-            print(f"FIGURE lines_unstrobed_bytes_taken {len(set(followed) - set(wanted))} bytes")
+            print(f"FIGURE lines_bytes_taken {len(followed)} bytes", flush=True)
+            print(f"FIGURE lines_unstrobed_bytes_taken {len(set(followed) - set(wanted))} bytes", flush=True)
 
     def test_falls_back_and_says_so_when_the_alive_line_rests(self):
         with guest_with_program() as guest:
