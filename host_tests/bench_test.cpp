@@ -246,6 +246,44 @@ TEST(Bench, FollowsAByteThatWasStrobedAndFallsBackWhenTheAliveLineStops) {
   EXPECT_EQ(bench.row().cnc.override_pct, 0);
 }
 
+TEST(Bench, TakesAStrobedByteForASignOfLifeWhereThereIsNoAliveLine) {
+  using firmware::host::LineEvent;
+  auto config = bench_config();
+  config.by_lines = true;
+  config.has_alive = false;
+  config.wait_for_board = true;
+  auto bench = Bench::make(config, std::nullopt).value();
+  std::array<Frame, Bench::kMostFrames> frames;
+  const auto run_ms = [&](int time_ms) {
+    for (int k = 0; k < time_ms; ++k) static_cast<void>(bench.step(frames));
+  };
+  bench.receive({LineEvent::Kind::kAlarm, 1});
+  run_ms(100);
+  EXPECT_TRUE(bench.row().waiting);
+  bench.receive({LineEvent::Kind::kByte, 40});
+  run_ms(200);
+  EXPECT_EQ(bench.row().cnc.override_pct, 40);
+  bench.receive({LineEvent::Kind::kByte, 50});
+  run_ms(200);
+  EXPECT_EQ(bench.row().cnc.override_pct, 50);
+  run_ms(100);
+  EXPECT_EQ(bench.row().cnc.state, CncState::kFeedHold);
+}
+
+TEST(Bench, GivesTheBoardBackWhenItLeaves) {
+  const auto scenario = committed_scenario("bench_lathe");
+  auto bench = bench_with(scenario, bench_config());
+  auto board = board_of(scenario);
+  BenchTogether together{.bench = bench, .board = board};
+  while (bench.now_ns() < 5'000'000'000) together.step();
+  ASSERT_EQ(bench.heard().override->state,
+            static_cast<std::uint8_t>(control::SupervisorState::kControl));
+  bench.leave();
+  for (int k = 0; k < 100; ++k) together.step();
+  EXPECT_EQ(bench.heard().override->state,
+            static_cast<std::uint8_t>(control::SupervisorState::kReady));
+}
+
 TEST(Bench, RefusesWhatCannotBe) {
   auto config = bench_config();
   config.node = 0;

@@ -119,6 +119,7 @@ std::vector<Mistake> mistakes() {
        "twice"},
       {gpio("data = [0, 1, 2, 3, 4, 5, 6, 7]", "data = [0, 1, 2, 3, 4, 5, 6, 7.5]"),
        "board.toml:11", "whole number"},
+      {gpio("strobe = 8", "strobe = 8\nhold_us = 1451"), "board.toml:13", "skip ticks"},
       {gpio("strobe = 8", ""), "board.toml:9", "strobe"},
       {gpio("strobe = 8", "strobe = 3"), "board.toml:12", "used twice"},
       {gpio("strobe = 8", "strobe = 8\nactive_low = [9]"), "board.toml:13", "not used"},

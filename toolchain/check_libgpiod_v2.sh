@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# check_libgpiod_v2.sh: compiles hal/linux/gpio_lines_v2.cpp against the real header of libgpiod 2
-# and runs it over a stand-in for the library (host_tests/libgpiod_v2). Debian 12 has libgpiod 1
+# check_libgpiod_v2.sh: compiles hal/linux/gpio_lines_v2.cpp and peer_lines_v2.cpp against the real
+# header of libgpiod 2 and runs them over a stand-in for the library (host_tests/libgpiod_v2). Debian 12 has libgpiod 1
 # only, so the header is unpacked from Debian 13's package, by an apt state of its own: this machine's
 # packages stay as they are. Without that package it says so and ends with 77: skipped, not passed.
 set -euo pipefail
@@ -46,7 +46,8 @@ here=host_tests/libgpiod_v2
 g++ -std=c++2b -O1 -g -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow \
   -Wold-style-cast -Wswitch-enum -Werror -fsanitize=address,undefined -fno-sanitize-recover=all \
   -I. -Ihost_tests -isystem "$root/package/usr/include" \
-  hal/linux/gpio_lines_v2.cpp hal/linux/gpio_byte.cpp hal/linux/gpio_config.cpp \
+  hal/linux/gpio_lines_v2.cpp hal/linux/peer_lines_v2.cpp hal/linux/gpio_byte.cpp hal/linux/gpio_config.cpp \
   hal/linux/monotonic_clock.cpp "$here/stand_in.cpp" "$here/gpio_lines_v2_check.cpp" \
+  "$here/peer_lines_v2_check.cpp" \
   -lgtest -lgtest_main -o "$root/check"
 "$root/check" --gtest_brief=1

@@ -128,7 +128,7 @@ void check_lines(TomlSection& gpio, const GpioWiring& wiring) {
   }
 }
 
-std::optional<GpioWiring> read_gpio(TomlSection gpio) {
+std::optional<GpioWiring> read_gpio(TomlSection& gpio) {
   if (!gpio.present()) return std::nullopt;
   gpio.require("chip", "name the chip, for instance chip = \"gpiochip0\"");
   gpio.require("data", "give the offsets of the data lines, lowest bit first");
@@ -145,6 +145,18 @@ std::optional<GpioWiring> read_gpio(TomlSection gpio) {
                     .hold_us = whole_or(gpio, "hold_us", 50, 1, 10000)};
   check_lines(gpio, wiring);
   return wiring;
+}
+
+// The loop waits while a byte is strobed. A tick that begins late is made up for, one that is
+// skipped counts, and some of those are a hold (supervisor.hpp, overrun_ratio). Half a tick is left
+// to the tick's own work.
+void check_strobe(TomlSection& gpio, const GpioWiring& wiring, float tick_s) {
+  const float strobe_s = 1e-6F * static_cast<float>(wiring.setup_us + wiring.hold_us);
+  if (strobe_s <= 1.5F * tick_s) return;
+  gpio.refuse("hold_us",
+              "setup_us and hold_us together are longer than one and a half ticks: the loop would "
+              "skip ticks with each byte",
+              "shorten them, put a latch on the strobe, or give a longer tick_s in [run]");
 }
 
 std::optional<WatchdogWiring> read_watchdog(TomlSection watchdog) {
@@ -192,12 +204,14 @@ BoardFile read_all(TomlDocument& document) {
     samples.refuse("source", "there is no section [iio]",
                    "add [iio] with device, voltage, current and their scales");
   }
-  file.gpio = read_gpio(root.section("gpio"));
+  TomlSection gpio = root.section("gpio");
+  file.gpio = read_gpio(gpio);
   file.watchdog = read_watchdog(root.section("watchdog"));
   file.trace = read_trace(root.section("trace"));
   file.priority = static_cast<std::int32_t>(whole_or(run, "priority", 80, 1, 98));
   constexpr NumberRule kTick{.minimum = 0.0005F, .maximum = 0.01F, .unit = "s"};
   file.tick_s = run.number("tick_s", kTick).value_or(0.001F);
+  if (file.gpio) check_strobe(gpio, *file.gpio, file.tick_s);
   return file;
 }
 

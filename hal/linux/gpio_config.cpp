@@ -96,4 +96,17 @@ OpenError line_refused(const GpioConfig& config, const NamedLine& line,
   return refused;
 }
 
+OpenError edges_refused(const GpioConfig& config, const NamedLine& line,
+                        const std::string& line_name, int error) {
+  OpenError refused = line_refused(config, line, line_name, "", error);
+  if (error == ENXIO || error == ENODEV || error == EINVAL || error == EOPNOTSUPP ||
+      error == ENOSYS) {
+    refused.what += ": the chip detects no edges of it";
+    refused.remedy =
+        "take strobe, alive and alarm on a chip whose lines interrupt, such as the processor's "
+        "own; an expander needs its interrupt wired and named in the device tree";
+  }
+  return refused;
+}
+
 }  // namespace cutforce::hal::os

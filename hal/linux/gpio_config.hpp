@@ -48,6 +48,8 @@ struct GpioChip {
                                                         const std::vector<GpioChip>& chips);
 // /dev/gpiochip*, in order of number.
 [[nodiscard]] std::vector<std::string> gpio_device_paths();
+// What is behind them, of those that this program may open.
+[[nodiscard]] std::vector<GpioChip> gpio_chips();
 
 struct NamedLine {
   std::string role;  // "data 3"
@@ -59,5 +61,8 @@ struct NamedLine {
 [[nodiscard]] OpenError line_refused(const GpioConfig& config, const NamedLine& line,
                                      const std::string& line_name, const std::string& holder,
                                      int error);
+// The same where edges of it were asked for: most chips that cannot tell of edges say it this way.
+[[nodiscard]] OpenError edges_refused(const GpioConfig& config, const NamedLine& line,
+                                      const std::string& line_name, int error);
 
 }  // namespace cutforce::hal::os

@@ -17,17 +17,6 @@ struct CloseChip {
 };
 using Chip = std::unique_ptr<gpiod_chip, CloseChip>;
 
-std::vector<GpioChip> chips_here() {
-  std::vector<GpioChip> chips;
-  for (const auto& path : gpio_device_paths()) {
-    const Chip chip{gpiod_chip_open(path.c_str())};
-    if (!chip) continue;
-    chips.push_back({path, gpiod_chip_name(chip.get()), gpiod_chip_label(chip.get()),
-                     gpiod_chip_num_lines(chip.get())});
-  }
-  return chips;
-}
-
 std::string text_of(const char* text) { return text == nullptr ? "" : text; }
 
 int flag_of(bool active_low) { return active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0; }
@@ -38,6 +27,17 @@ std::expected<void, PortError> done(int result) noexcept {
 }
 
 }  // namespace
+
+std::vector<GpioChip> gpio_chips() {
+  std::vector<GpioChip> chips;
+  for (const auto& path : gpio_device_paths()) {
+    const Chip chip{gpiod_chip_open(path.c_str())};
+    if (!chip) continue;
+    chips.push_back({path, gpiod_chip_name(chip.get()), gpiod_chip_label(chip.get()),
+                     gpiod_chip_num_lines(chip.get())});
+  }
+  return chips;
+}
 
 struct GpioLines::Impl {
   Chip chip;  // closing it releases its lines
@@ -112,7 +112,7 @@ GpioLines::~GpioLines() = default;
 
 auto GpioLines::open(const GpioConfig& config) -> std::expected<GpioLines, OpenError> {
   if (const auto checked = check(config); !checked) return std::unexpected{checked.error()};
-  const auto chip = choose(config, chips_here());
+  const auto chip = choose(config, gpio_chips());
   if (!chip) return std::unexpected{chip.error()};
   auto impl = std::make_unique<Impl>();
   impl->chip.reset(gpiod_chip_open(chip->path.c_str()));

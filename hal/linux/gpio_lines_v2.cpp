@@ -28,20 +28,6 @@ struct Free {
 template <class T>
 using Owned = std::unique_ptr<T, Free>;
 
-std::vector<GpioChip> chips_here() {
-  std::vector<GpioChip> chips;
-  for (const auto& path : gpio_device_paths()) {
-    const Owned<gpiod_chip> chip{gpiod_chip_open(path.c_str())};
-    if (!chip) continue;
-    const Owned<gpiod_chip_info> info{gpiod_chip_get_info(chip.get())};
-    if (!info) continue;
-    chips.push_back({path, gpiod_chip_info_get_name(info.get()),
-                     gpiod_chip_info_get_label(info.get()),
-                     gpiod_chip_info_get_num_lines(info.get())});
-  }
-  return chips;
-}
-
 std::string text_of(const char* text) { return text == nullptr ? "" : text; }
 
 gpiod_line_value value_of(bool active) noexcept {
@@ -107,6 +93,20 @@ OpenError why_refused(gpiod_chip* chip, const GpioConfig& config, int error) {
 
 }  // namespace
 
+std::vector<GpioChip> gpio_chips() {
+  std::vector<GpioChip> chips;
+  for (const auto& path : gpio_device_paths()) {
+    const Owned<gpiod_chip> chip{gpiod_chip_open(path.c_str())};
+    if (!chip) continue;
+    const Owned<gpiod_chip_info> info{gpiod_chip_get_info(chip.get())};
+    if (!info) continue;
+    chips.push_back({path, gpiod_chip_info_get_name(info.get()),
+                     gpiod_chip_info_get_label(info.get()),
+                     gpiod_chip_info_get_num_lines(info.get())});
+  }
+  return chips;
+}
+
 struct GpioLines::Impl {
   Owned<gpiod_line_request> request;
   std::array<unsigned, 8> data{};
@@ -139,7 +139,7 @@ GpioLines::~GpioLines() = default;
 
 auto GpioLines::open(const GpioConfig& config) -> std::expected<GpioLines, OpenError> {
   if (const auto checked = check(config); !checked) return std::unexpected{checked.error()};
-  const auto chosen = choose(config, chips_here());
+  const auto chosen = choose(config, gpio_chips());
   if (!chosen) return std::unexpected{chosen.error()};
   const Owned<gpiod_chip> chip{gpiod_chip_open(chosen->path.c_str())};
   if (!chip) return std::unexpected{line_refused(config, {"the chip", 0}, "", "", errno)};

@@ -1,9 +1,10 @@
-// The part of libgpiod 2.x that gpio_lines_v2.cpp calls, over one imaginary chip. Its declarations
-// are those of the real header, so a call with wrong types does not compile.
+// The part of libgpiod 2.x that gpio_lines_v2.cpp and peer_lines_v2.cpp call, over one imaginary
+// chip. Its declarations are those of the real header, so a call with wrong types does not compile.
 #include "libgpiod_v2/stand_in.hpp"
 
 #include <gpiod.h>
 
+#include <algorithm>
 #include <cerrno>
 
 using cutforce::host_tests::stand_in;
@@ -21,6 +22,7 @@ struct gpiod_line_settings {
   bool output = false;
   bool active_low = false;
   int level = 0;
+  gpiod_line_edge edge = GPIOD_LINE_EDGE_NONE;
 };
 struct gpiod_line_config {
   std::vector<std::pair<unsigned, gpiod_line_settings>> lines;
@@ -29,6 +31,13 @@ struct gpiod_request_config {
   std::string consumer;
 };
 struct gpiod_line_request {};
+struct gpiod_edge_event {
+  cutforce::host_tests::StandIn::Edge edge;
+};
+struct gpiod_edge_event_buffer {
+  size_t capacity = 0;
+  std::vector<gpiod_edge_event> events;
+};
 
 namespace {
 
@@ -82,6 +91,11 @@ int gpiod_line_settings_set_output_value(gpiod_line_settings* settings, gpiod_li
   return 0;
 }
 
+int gpiod_line_settings_set_edge_detection(gpiod_line_settings* settings, gpiod_line_edge edge) {
+  settings->edge = edge;
+  return 0;
+}
+
 gpiod_line_config* gpiod_line_config_new() { return give<gpiod_line_config>(); }
 void gpiod_line_config_free(gpiod_line_config* config) { take_back(config); }
 int gpiod_line_config_add_line_settings(gpiod_line_config* config, const unsigned int* offsets,
@@ -103,11 +117,18 @@ gpiod_line_request* gpiod_chip_request_lines(gpiod_chip* /*chip*/, gpiod_request
       return nullptr;
     }
   }
+  for (const auto& [offset, settings] : config->lines) {
+    if (stand_in.no_edges && settings.edge != GPIOD_LINE_EDGE_NONE) {
+      errno = ENXIO;
+      return nullptr;
+    }
+  }
   stand_in.consumer = how->consumer;
   for (const auto& [offset, settings] : config->lines) {
     stand_in.requested.at(offset) = true;
     stand_in.output.at(offset) = settings.output;
     stand_in.active_low.at(offset) = settings.active_low;
+    stand_in.edges.at(offset) = settings.edge;
     if (settings.output) stand_in.level.at(offset) = settings.level;
   }
   return give<gpiod_line_request>();
@@ -138,5 +159,42 @@ gpiod_line_value gpiod_line_request_get_value(gpiod_line_request* /*request*/,
   if (stand_in.refuse || !stand_in.requested.at(offset)) return GPIOD_LINE_VALUE_ERROR;
   return stand_in.level.at(offset) != 0 ? GPIOD_LINE_VALUE_ACTIVE : GPIOD_LINE_VALUE_INACTIVE;
 }
+int gpiod_line_request_get_values_subset(gpiod_line_request* request, size_t count,
+                                         const unsigned int* offsets, gpiod_line_value* values) {
+  for (size_t i = 0; i < count; ++i) {
+    values[i] = gpiod_line_request_get_value(request, offsets[i]);
+    if (values[i] == GPIOD_LINE_VALUE_ERROR) return -1;
+  }
+  return 0;
+}
+
+gpiod_edge_event_buffer* gpiod_edge_event_buffer_new(size_t capacity) {
+  return give(gpiod_edge_event_buffer{capacity, {}});
+}
+void gpiod_edge_event_buffer_free(gpiod_edge_event_buffer* buffer) { take_back(buffer); }
+int gpiod_line_request_wait_edge_events(gpiod_line_request* /*request*/, int64_t timeout_ns) {
+  if (stand_in.refuse || timeout_ns != 0) return -1;  // the only caller must not wait
+  return stand_in.queue.empty() ? 0 : 1;
+}
+int gpiod_line_request_read_edge_events(gpiod_line_request* /*request*/,
+                                        gpiod_edge_event_buffer* buffer, size_t most) {
+  buffer->events.clear();
+  while (!stand_in.queue.empty() && buffer->events.size() < std::min(most, buffer->capacity)) {
+    buffer->events.push_back({stand_in.queue.front()});
+    stand_in.queue.pop_front();
+  }
+  return static_cast<int>(buffer->events.size());
+}
+gpiod_edge_event* gpiod_edge_event_buffer_get_event(gpiod_edge_event_buffer* buffer,
+                                                    unsigned long index) {
+  return &buffer->events.at(index);
+}
+unsigned int gpiod_edge_event_get_line_offset(gpiod_edge_event* event) {
+  return event->edge.offset;
+}
+gpiod_edge_event_type gpiod_edge_event_get_event_type(gpiod_edge_event* event) {
+  return event->edge.rising ? GPIOD_EDGE_EVENT_RISING_EDGE : GPIOD_EDGE_EVENT_FALLING_EDGE;
+}
+uint64_t gpiod_edge_event_get_timestamp_ns(gpiod_edge_event* event) { return event->edge.time_ns; }
 
 }  // extern "C"

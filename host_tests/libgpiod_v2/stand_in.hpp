@@ -3,6 +3,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <deque>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,8 +18,16 @@ struct StandIn {
   std::array<bool, kLines> requested{};
   std::array<bool, kLines> output{};
   std::array<bool, kLines> active_low{};
+  std::array<int, kLines> edges{};  // gpiod_line_edge of the request
   std::string consumer;
-  int busy_line = -1;  // held by somebody else
+  int busy_line = -1;     // held by somebody else
+  bool no_edges = false;  // the chip has no interrupts
+  struct Edge {
+    unsigned offset;
+    bool rising;
+    std::uint64_t time_ns;
+  };
+  std::deque<Edge> queue;  // not fetched yet
   bool refuse = false;
   std::vector<std::pair<unsigned, int>> changes;  // after the request: line, level
   int alive_objects = 0;                          // given out and not yet freed

@@ -31,7 +31,10 @@ namespace cutforce::host_tests {
           .wait_for_board = false,
           .threading = false,
           .code = control::OverrideCode::kBinary,
-          .by_lines = false};
+          .by_lines = false,
+          .has_alive = true,
+          .inhibit_ns = 0,
+          .inhibit_end_ns = 0};
 }
 
 [[nodiscard]] inline firmware::host::Bench bench_with(

@@ -52,6 +52,7 @@ void Bench::receive(const LineEvent& event) noexcept {
       lines_.byte = event.value;
       lines_.override_pct = control::decode(config_.code, event.value);
       if (!lines_.override_pct) ++lines_.invalid;
+      lines_.is_new = lines_.is_new || !config_.has_alive;
       return;
     case LineEvent::Kind::kAlive:
       ++lines_.alive_edges;
@@ -68,7 +69,7 @@ std::size_t Bench::step(std::span<hal::can::Frame, kMostFrames> frames) noexcept
   const BenchLathe::Machine machine = lathe_ ? lathe_->machine() : kSteadyMachine;
   if (waiting_) {
     const bool heard =
-        listener_.state().heartbeat || listener_.state().override || lines_.alive_edges != 0;
+        listener_.state().heartbeat || listener_.state().override || heard_by_lines();
     waiting_ = !heard || clock_ns_ % kMachineStateCycle_ns != 0;
     if (!waiting_) machine_state_ns_ = job_ns_ = 0;
   }
@@ -129,9 +130,9 @@ hal::can::Frame Bench::machine_state(const BenchLathe::Machine& machine,
                                      const CncModel::Output& cnc) noexcept {
   const std::uint8_t applied =
       lathe_ ? machine.override_applied_pct : std::min<std::uint8_t>(cnc.override_pct, 254);
-  return hal::can::pack(hal::can::MachineState{.arm = cnc.arm,
-                                               .control = cnc.control,
-                                               .reset = cnc.reset,
+  return hal::can::pack(hal::can::MachineState{.arm = cnc.arm && !leaving_,
+                                               .control = cnc.control && !leaving_,
+                                               .reset = cnc.reset && !leaving_,
                                                .spindle_at_speed = machine.spindle_at_speed,
                                                .cutting_feed = machine.cutting_feed,
                                                .rapid = false,

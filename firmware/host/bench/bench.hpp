@@ -8,6 +8,8 @@
 //               just started would else wait three seconds for it
 //   receive  <- frames of the board, or edges of its lines
 //
+// After leave() the CNC gives the board back: arm and control are low in every frame.
+//
 // With `wait_for_board` the lathe stands still at time 0 until the board has been heard; until then
 // a step sends what the CNC says, and no sample.
 #pragma once
@@ -40,9 +42,12 @@ class Bench {
     hal::can::Job job;  // the diameter is the lathe's where it has one
     std::uint8_t tool;
     bool wait_for_board;
-    bool threading;              // the CNC says so throughout
-    control::OverrideCode code;  // of the byte
-    bool by_lines;               // override and sign of life come by the lines, not by the bus
+    bool threading;               // the CNC says so throughout
+    control::OverrideCode code;   // of the byte
+    bool by_lines;                // override and sign of life come by the lines, not by the bus
+    bool has_alive;               // else each strobed byte is a sign of life
+    std::int64_t inhibit_ns;      // from here to ..
+    std::int64_t inhibit_end_ns;  // .. here the CNC forbids control by its line
   };
 
   // One instant of what is told, shown and written.
@@ -75,6 +80,7 @@ class Bench {
   [[nodiscard]] std::size_t step(std::span<hal::can::Frame, kMostFrames> frames) noexcept;
   void receive(const hal::can::Frame& frame) noexcept { listener_.take(frame, clock_ns_); }
   void receive(const LineEvent& event) noexcept;
+  void leave() noexcept { leaving_ = true; }
 
   [[nodiscard]] std::int64_t period_ns() const noexcept { return period_ns_; }
   // Of the step that comes next.
@@ -83,6 +89,13 @@ class Bench {
   [[nodiscard]] const Row& row() const noexcept { return row_; }
   [[nodiscard]] const BoardListener::State& heard() const noexcept { return listener_.state(); }
   [[nodiscard]] const Lines& lines() const noexcept { return lines_; }
+  // The board has shown by its lines that it lives.
+  [[nodiscard]] bool heard_by_lines() const noexcept {
+    return (config_.has_alive ? lines_.alive_edges : lines_.bytes) != 0;
+  }
+  [[nodiscard]] bool inhibits() const noexcept {
+    return row_.time_ns >= config_.inhibit_ns && row_.time_ns < config_.inhibit_end_ns;
+  }
   [[nodiscard]] const CncModel::State& cnc() const noexcept { return cnc_.state(); }
   [[nodiscard]] const Config& config() const noexcept { return config_; }
   [[nodiscard]] const std::optional<BenchLathe>& lathe() const noexcept { return lathe_; }
@@ -109,6 +122,7 @@ class Bench {
   std::uint8_t job_counter_ = 0;
   std::uint32_t job_repeats_ = hal::can::GuardReceiver::kTrust;
   bool waiting_;
+  bool leaving_ = false;
   Row row_{};
 };
 

@@ -41,10 +41,7 @@ void BenchLog::note(const Bench& bench) {
     event(row.time_ns, "CNC: " + std::string(cnc_text(cnc_)));
   }
   note_board(bench);
-  if (bench.lines().alarms != alarms_) {
-    alarms_ = bench.lines().alarms;
-    event(row.time_ns, "alarm line: on");
-  }
+  note_lines(bench);
   if (row.has_truth) note_force(row);
 }
 
@@ -69,6 +66,23 @@ void BenchLog::note_board(const Bench& bench) {
                        ? std::string("emergency: taken back")
                        : formatted("emergency: code %04x, %s", emergency.error_code,
                                    reason_name(emergency.reason).data()));
+  }
+}
+
+void BenchLog::note_lines(const Bench& bench) {
+  const std::int64_t time_ns = bench.row().time_ns;
+  const auto& lines = bench.lines();
+  if (lines.alarms != alarms_) {
+    alarms_ = lines.alarms;
+    event(time_ns, "alarm line: on");
+  }
+  if (lines.invalid != invalid_) {
+    invalid_ = lines.invalid;
+    event(time_ns, formatted("byte 0x%02X, which the code does not define", lines.byte));
+  }
+  if (bench.inhibits() != inhibits_) {
+    inhibits_ = bench.inhibits();
+    event(time_ns, inhibits_ ? "inhibit line: on, control is forbidden" : "inhibit line: off");
   }
 }
 
@@ -148,14 +162,14 @@ std::vector<Figure> BenchLog::figures(const Bench& bench) const {
 }
 
 bool BenchLog::held(const Bench& bench) const noexcept {
-  if (bench.config().by_lines) return bench.lines().alive_edges != 0;
+  if (bench.config().by_lines) return bench.heard_by_lines();
   if (!bench.heard().override) return false;
   return (!bench.config().cnc.arm || armed_) && (!bench.config().cnc.control || controlled_);
 }
 
 std::string BenchLog::verdict(const Bench& bench) const {
   const bool lines = bench.config().by_lines;
-  if (lines ? bench.lines().alive_edges == 0 : !bench.heard().override) {
+  if (lines ? !bench.heard_by_lines() : !bench.heard().override) {
     return "The board was not heard.";
   }
   if (bench.config().cnc.arm && !armed_ && !lines) return "The board was heard, but not armed.";
@@ -174,6 +188,9 @@ std::string live_text(const Bench& bench) {
   const auto& row = bench.row();
   if (row.waiting) return "waiting for the board";
   std::string text = heard.override ? board_text(*heard.override) : std::string("board not heard");
+  if (!heard.override && bench.heard_by_lines()) {
+    text = formatted("byte 0x%02X", bench.lines().byte);
+  }
   text += formatted(", override %u %%", row.cnc.override_pct);
   if (heard.override && heard.override->force_n) {
     text += formatted(", force %.0f N", static_cast<double>(*heard.override->force_n));

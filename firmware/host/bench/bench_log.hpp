@@ -37,6 +37,7 @@ class BenchLog {
 
   void event(std::int64_t time_ns, std::string text);
   void note_board(const Bench& bench);
+  void note_lines(const Bench& bench);
   void note_force(const Bench::Row& row);
   void add_stretches(std::vector<Figure>& out) const;
 
@@ -49,6 +50,8 @@ class BenchLog {
   std::uint32_t board_ = 0x10000;  // state and reason; none yet
   std::uint32_t emergencies_ = 0;
   std::uint32_t alarms_ = 0;
+  std::uint32_t invalid_ = 0;
+  bool inhibits_ = false;
   bool armed_ = false;
   bool controlled_ = false;
 };

@@ -41,15 +41,20 @@ class LineLink {
   // As hal::CanPort's receive().
   [[nodiscard]] virtual std::expected<std::size_t, hal::PortError> read(
       std::span<LineEvent> events) = 0;
+  // Does nothing where there is no such line.
+  [[nodiscard]] virtual std::expected<void, hal::PortError> set_inhibit(bool active) = 0;
 };
 
-// Line offsets on one chip, as the board's wiring has them.
+// Line offsets on one chip, as the board's wiring has them; -1: there is none.
 struct LineChoice {
   std::string chip;
-  std::vector<unsigned> data;  // bit 0 first; eight
-  unsigned strobe;
-  unsigned alive;
-  int alarm;  // -1: there is none
+  std::vector<unsigned> data;  // bit 0 first; eight, or four
+  int strobe;
+  int alive;
+  int alarm;
+  int inhibit;  // an output
+  bool data_active_low;
+  std::vector<unsigned> active_low;  // of the others
 };
 
 struct CanChoice {

@@ -21,6 +21,8 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kMostBehind{100};
 constexpr std::size_t kMostFramesAStep = 256;
 constexpr std::int64_t kStepsAShow = 50;
+// MachineStates after the end; a board that has just started trusts the third.
+constexpr std::int64_t kClosing_ns = 5 * Bench::kMachineStateCycle_ns;
 
 // An absolute schedule, and how badly it was kept.
 class Pace {
@@ -79,6 +81,23 @@ class Session {
     }
   }
 
+  std::expected<void, InputError> show_inhibit() {
+    if (lines_ == nullptr || bench_.inhibits() == inhibits_) return {};
+    inhibits_ = bench_.inhibits();
+    if (!lines_->set_inhibit(inhibits_)) return refused("inhibit line");
+    return {};
+  }
+
+  // The board is given back. What it answers does not matter any more, nor does a link that fails.
+  void leave(Pace* pace) {
+    bench_.leave();
+    for (std::int64_t left_ns = kClosing_ns; left_ns > 0; left_ns -= bench_.period_ns()) {
+      if (pace != nullptr) pace->wait();
+      if (!receive()) return;
+      step();
+    }
+  }
+
   [[nodiscard]] double unsent() const { return static_cast<double>(unsent_); }
 
  private:
@@ -91,6 +110,7 @@ class Session {
   CanLink* can_;
   LineLink* lines_;
   std::uint64_t unsent_ = 0;
+  bool inhibits_ = false;
 };
 
 std::int64_t whole_ns(double time_s) { return static_cast<std::int64_t>(time_s * 1e9 + 0.5); }
@@ -116,6 +136,7 @@ std::expected<BenchResult, InputError> run_bench(Bench& bench, CanLink* can, Lin
       if (run.paced) pace.wait();
       if (auto received = session.receive(); !received) return std::unexpected{received.error()};
       session.step();
+      if (auto shown = session.show_inhibit(); !shown) return std::unexpected{shown.error()};
       log.note(bench);
       if (bench.row().waiting) ++waited;
       if (trace) {
@@ -139,6 +160,7 @@ std::expected<BenchResult, InputError> run_bench(Bench& bench, CanLink* can, Lin
     result.figures.push_back({"unsent", "Frames that could not be sent", session.unsent()});
   }
   if (run.paced) pace.add_to(result.figures);
+  if (!run.abrupt && !bench.row().waiting) session.leave(run.paced ? &pace : nullptr);
   return result;
 }
 

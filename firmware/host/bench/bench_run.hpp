@@ -18,6 +18,7 @@ struct BenchRun {
   double duration_s;            // of sample time; 0: until somebody ends it
   double wait_s;                // for the board
   bool paced;                   // false: as fast as it goes, for a board that is a call
+  bool abrupt;                  // stops in the midst, as if a cable were pulled
   std::filesystem::path trace;  // empty: none
 };
 
@@ -28,7 +29,9 @@ struct BenchResult {
   bool held;  // BenchLog::held()
 };
 
-// Either link may be null. Fails iff the trace cannot be written or the system refuses a link.
+// In the end, unless it is abrupt, some more frames say that arm and control are low; they are not
+// part of the result. Either link may be null. Fails iff the trace cannot be written or the system
+// refuses a link.
 [[nodiscard]] std::expected<BenchResult, hal::host::InputError> run_bench(Bench& bench,
                                                                           CanLink* can,
                                                                           LineLink* lines,

@@ -26,6 +26,12 @@ The CNC takes the newest override over each --latency milliseconds of sample tim
 quicker than that takes effect at the same instant, however much it jitters. When the board has been
 silent for --timeout, the CNC falls back and says to what.
 
+With --gpio the byte on the lines is the override, taken at the strobe's active edge. Without --alive
+each strobed byte is a sign of life; the board strobes changes only, so give a --timeout for that.
+
+In the end five more MachineStates say that arm and control are low, so that the board gives the feed
+back before it misses the link; with --abrupt they do not come.
+
 Examples:
   cutforce cnc --can can0 --arm
   cutforce cnc --can can0 --lathe host_tests/scenarios/bench_lathe.toml --control --out bench.csv
@@ -46,6 +52,18 @@ std::optional<InputError> wrong_choice(const CncOptions& o) {
   if (!o.lines.chip.empty() && o.lines.data.size() != 8 && o.lines.data.size() != 4) {
     return InputError{"--data", "there are not eight data lines, nor four for fanuc_ov_10",
                       "name the offsets on the chip, bit 0 first: --data 0,1,2,3,4,5,6,7"};
+  }
+  if (o.lines.data.size() == 4 && o.code != "fanuc_ov_10") {
+    return InputError{"--data", "four data lines do not carry the code " + o.code,
+                      "name eight lines, or give --code fanuc_ov_10"};
+  }
+  if (!o.lines.chip.empty() && o.lines.strobe < 0) {
+    return InputError{"--strobe", "there is no strobe line, and without one no byte is whole",
+                      "name the line on which the board strobes: --strobe 8"};
+  }
+  if (o.lines.chip.empty() && (o.lines.strobe >= 0 || o.lines.inhibit >= 0)) {
+    return InputError{"--gpio", "lines are named, but not on which chip",
+                      "give --gpio CHIP, such as gpiochip0 (see gpiodetect)"};
   }
   return std::nullopt;
 }
@@ -109,9 +127,12 @@ Exit perform(const CncOptions& o, const BenchPorts& ports) {
     lines = std::move(*link);
   }
   catch_stop_signals();
-  const auto result = run_bench(
-      *bench, can.get(), lines.get(),
-      {.duration_s = duration_s, .wait_s = o.wait_s, .paced = ports.paced, .trace = o.out});
+  const auto result = run_bench(*bench, can.get(), lines.get(),
+                                {.duration_s = duration_s,
+                                 .wait_s = o.wait_s,
+                                 .paced = ports.paced,
+                                 .abrupt = o.abrupt,
+                                 .trace = o.out});
   if (!result) return refuse(result.error());
   show(*result, o);
   return result->held ? Exit::kDone : Exit::kFailed;

@@ -35,6 +35,10 @@ hal::can::Job job_of(const CncOptions& o) {
           .diameter_m = std::nullopt};
 }
 
+void add_line(CLI::App& command, const char* name, int& line, const char* text) {
+  command.add_option(name, line, text)->check(CLI::Range(0, 4095))->type_name("N");
+}
+
 void add_wires(CLI::App& command, CncOptions& o) {
   command.add_option("--can", o.can, "CAN interface, such as can0")->type_name("IFACE");
   command.add_option("--node", o.node, "The board's node id")
@@ -47,12 +51,31 @@ void add_wires(CLI::App& command, CncOptions& o) {
   command.add_option("--data", o.lines.data, "Offsets of the data lines, bit 0 first")
       ->delimiter(',')
       ->type_name("N,N,...");
-  command.add_option("--strobe", o.lines.strobe, "Offset of the strobe line")->type_name("N");
-  command.add_option("--alive", o.lines.alive, "Offset of the alive line")->type_name("N");
-  command.add_option("--alarm", o.lines.alarm, "Offset of the alarm line")->type_name("N");
+  add_line(command, "--strobe", o.lines.strobe,
+           "Offset of the strobe line: the byte is taken at its active edge");
+  add_line(command, "--alive", o.lines.alive,
+           "Offset of the alive line; left out: each strobed byte is a sign of life");
+  add_line(command, "--alarm", o.lines.alarm, "Offset of the alarm line");
+  command.add_flag("--data-active-low", o.lines.data_active_low, "The data lines are turned over");
+  command.add_option("--active-low", o.lines.active_low, "Which of the other lines are")
+      ->delimiter(',')
+      ->type_name("N,N,...");
   command.add_option("--code", o.code, "Code of the byte")
       ->check(CLI::IsMember(std::vector<std::string>(control::kOverrideCodeNames.begin(),
                                                      control::kOverrideCodeNames.end())))
+      ->capture_default_str();
+}
+
+void add_inhibit(CLI::App& command, CncOptions& o) {
+  add_line(command, "--inhibit", o.lines.inhibit,
+           "Offset of the line by which the CNC forbids control: an output");
+  command.add_option("--inhibit-at", o.inhibit_at_s, "From this time on it does")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("S")
+      ->capture_default_str();
+  command.add_option("--inhibit-for", o.inhibit_for_s, "For so long")
+      ->check(CLI::PositiveNumber)
+      ->type_name("S")
       ->capture_default_str();
 }
 
@@ -120,6 +143,8 @@ void add_run_options(CLI::App& command, CncOptions& o) {
   command.add_flag("--no-wait", o.no_wait, "Do not wait for the board");
   command.add_option("--out", o.out, "Trace of what was seen (.csv, .csv.gz)")->type_name("FILE");
   command.add_flag("--json", o.json, "Print the closing table as JSON");
+  command.add_flag("--abrupt", o.abrupt,
+                   "End in the midst, as if the cable were pulled, without arm and control low");
 }
 
 }  // namespace
@@ -140,11 +165,16 @@ Bench::Config CncOptions::bench() const {
           .wait_for_board = !o.no_wait,
           .threading = o.threading,
           .code = code_of(o.code),
-          .by_lines = !o.lines.chip.empty()};
+          .by_lines = !o.lines.chip.empty(),
+          .has_alive = o.lines.alive >= 0,
+          .inhibit_ns = whole_ns(o.inhibit_at_s),
+          .inhibit_end_ns =
+              whole_ns(o.lines.inhibit < 0 ? o.inhibit_at_s : o.inhibit_at_s + o.inhibit_for_s)};
 }
 
 void CncOptions::add_to(CLI::App& command) {
   add_wires(command, *this);
+  add_inhibit(command, *this);
   add_cnc_options(command, *this);
   add_job_options(command, *this);
   add_run_options(command, *this);

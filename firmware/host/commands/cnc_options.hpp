@@ -10,7 +10,16 @@ namespace cutforce::firmware::host {
 
 struct CncOptions {
   std::string can;
-  LineChoice lines{.chip = {}, .data = {}, .strobe = 0, .alive = 0, .alarm = -1};
+  LineChoice lines{.chip = {},
+                   .data = {},
+                   .strobe = -1,
+                   .alive = -1,
+                   .alarm = -1,
+                   .inhibit = -1,
+                   .data_active_low = false,
+                   .active_low = {}};
+  double inhibit_at_s = 5.0;
+  double inhibit_for_s = 1.0;
   std::string code = "binary";
   unsigned node = 1;
   std::string lathe;
@@ -34,6 +43,7 @@ struct CncOptions {
   bool threading = false;
   std::string out;
   bool json = false;
+  bool abrupt = false;
 
   void add_to(CLI::App& command);
   [[nodiscard]] Bench::Config bench() const;
