@@ -236,5 +236,191 @@ class AServedBoard(unittest.TestCase):
         self.assertIn("restarts of the bus 1", log)
 
 
+ERROR = 0x20000000  # linux/can/error.h
+ANY = "0:0,#FFFFFFFF"  # every frame, and every error frame
+
+
+class AnErrorFrame(unittest.TestCase):
+    """Of the kernel, told by a virtual bus that hands them on."""
+
+    HARMLESS = {
+        "transmit time-out": (0x01, bytes(8)),
+        "lost arbitration": (0x02, bytes(8)),
+        "receive overflow": (0x04, b"\0\1"),
+        "receive warning": (0x04, b"\0\4"),
+        "transmit warning": (0x04, b"\0\10"),
+        "receive passive": (0x04, b"\0\20"),
+        "transmit passive": (0x04, b"\0\40"),
+        "active again": (0x04, b"\0\100"),
+        "bit error": (0x08, b"\0\0\1"),
+        "transceiver": (0x10, b"\0\0\0\0\4"),
+        "bus error": (0x80, bytes(8)),
+        "restarted": (0x100, bytes(8)),
+        "counters": (0x200, b"\0\0\0\0\0\0\200\200"),
+    }
+    DOWN = {
+        "bus-off": (0x40, bytes(8)),
+        "no acknowledge": (0x20, bytes(8)),
+        "no acknowledge, by its place": (0x08, b"\0\0\0\x19"),
+    }
+
+    def play(self, guest, errors):
+        """Each error a tenth of a second after the one before, in monitor."""
+        cnc = Cnc()
+        end_s = 1.2 + 0.1 * len(errors)
+        script = Script("vcan0").state(0, 0.8, cnc).state(0.8, end_s, cnc, arm=True)
+        for k, (classes, data) in enumerate(errors):
+            script.frame(1.2 + 0.1 * k, f"{ERROR | classes:08X}#{data.ljust(8, bytes(1)).hex()}")
+        # Up to here: a virtual bus that is restarted takes its player's frames with it.
+        script.samples(0, 1.2 + 0.1 * (len(errors) - 1) + 0.05)
+        script.frames = [timed for timed in script.frames if timed[0] < end_s - 0.05]
+        service = guest.serve()
+        frames = guest.play(script, listen=f"vcan0,{ANY}", after_s=0.02)
+        guest.stop(service)
+        return frames, guest.edges(ALARM, guest.line_changes())
+
+    def test_leads_to_the_state_of_its_class(self):
+        with ServedBoard(interface="vcan0", can=0, icount=True) as guest:
+            guest.run("ip link add vcan0 type vcan && ip link set vcan0 up")
+            frames, alarms = self.play(guest, list(self.HARMLESS.values()))
+            told = {f.identifier for f in frames if f.identifier & ERROR}
+            self.assertEqual(told, {ERROR | classes for classes, _ in self.HARMLESS.values()})
+            self.assertEqual(course(frames)[-2:], [("ready", "none"), ("monitor", "none")])
+            self.assertGreater(first_after(0, alarms), max(f.time_s for f in frames))
+            for name, error in self.DOWN.items():
+                with self.subTest(name):
+                    frames, alarms = self.play(guest, [error])
+                    error_s = next(f.time_s for f in frames if f.identifier & ERROR)
+                    reaction_s = first_after(error_s, alarms) - error_s
+                    figure(f"bus_error_reaction ({name})", f"{1e3 * reaction_s:.2f}", "ms")
+                    self.assertLess(reaction_s, 1.5 * TICK_S)  # the next tick, and what it takes
+                    self.assertIn(
+                        "The CAN bus is off, nobody answers, or the interface is down.",
+                        "".join(reason for state, reason in guest.states() if state == "link_lost"),
+                    )
+
+
+def command(word):
+    """To slcan_adapter."""
+    return text(0x7FF, word.encode())
+
+
+class SerialBoard(ServedBoard):
+    """The service on can0 of a serial adapter, whose bus is vcan0."""
+
+    def __init__(self):
+        super().__init__(needs=["slcan_adapter"], can=0, icount=True)
+        self.run("ip link add vcan0 type vcan && ip link set vcan0 up")
+        self.start("slcan_adapter vcan0 > /tmp/name")
+        self.run("sleep 0.1; [ $(cat /tmp/name) = can0 ]")
+        self.run("ip link set can0 up type can bitrate 500000 restart-ms 0")
+        self.service = self.serve()
+
+    def play_wire(self, script):
+        """What was on the bus, and what the service's interface told of errors."""
+        frames = self.play(script, listen=f"vcan0,{ANY} can0,{ANY}")
+        wire = [f for f in frames if f.interface == "vcan0"]
+        errors = [f for f in frames if f.interface == "can0" and f.identifier & ERROR]
+        return wire, errors
+
+
+class ASerialAdapter(unittest.TestCase):
+    """Between the board and its bus: what an emulated controller cannot do."""
+
+    def test_that_warns_changes_nothing_and_one_that_nobody_answers_loses_the_link(self):
+        cnc = Cnc()
+        script = Script("vcan0").state(0, 0.8, cnc).state(0.8, 1.8, cnc, arm=True)
+        for time_s, word in ((1.1, "sw000100"), (1.2, "sp000130"), (1.4, "e1a")):
+            script.frame(time_s, command(word))
+        script.state(1.8, 1.9, cnc).state(1.9, 2.0, cnc, arm=True)
+        script.state(2.0, 2.1, cnc).state(2.1, 2.5, cnc, arm=True).samples(0, 2.5)
+        # The cable is pulled: nobody talks, nobody answers, and no error frame says so.
+        script.frame(2.5, command("noack"))
+        with SerialBoard() as guest:
+            wire, errors = guest.play_wire(script)
+            guest.run("sleep 0.4")
+            guest.stop(guest.service)
+            alarms = guest.edges(ALARM, guest.line_changes())
+            states = [state for state, _ in guest.states()]
+        self.assertEqual(len(errors), 3)
+        reaction_s = first_after(errors[2].time_s, alarms) - errors[2].time_s
+        figure("bus_no_acknowledge_reaction", f"{1e3 * reaction_s:.2f}", "ms")
+        self.assertLess(reaction_s, 1.5 * TICK_S)
+        self.assertEqual(
+            course(wire)[-4:],
+            [("monitor", "none"), ("link_lost", "bus_down"), ("ready", "none"), ("monitor", "none")],
+        )
+        start_s = wire[0].time_s
+        lost_s = next(f.time_s for f in wire if f.identifier == OVERRIDE and f.state == "link_lost")
+        self.assertGreater(lost_s - start_s, 1.4)  # warning and passive did not
+        pulled_s = next(f.time_s for f in wire if f.frame == command("noack"))
+        silent_s = first_after(pulled_s, alarms) - pulled_s
+        figure("bus_pulled_reaction", f"{1e3 * silent_s:.0f}", "ms without an error frame")
+        self.assertLess(silent_s, LINK_TIMEOUT_S)  # 200 ms without an answer, and a cycle
+        self.assertEqual(states[-2:], ["link_lost", "dead"])
+
+    def test_that_goes_off_comes_back_after_longer_and_longer_delays_without_a_stale_frame(self):
+        delays_s = [0.1, 1.0] + [10.0] * (998 if LONG else 2)
+        cnc = Cnc()
+        script = Script("vcan0").state(0, 0.8, cnc).state(0.8, 1.2, cnc, arm=True).samples(0, 1.2)
+        off_s, offs = 1.2, []
+        for delay_s in delays_s:
+            offs.append(off_s)
+            script.frame(off_s, command("sb000255"))
+            back_s = off_s + delay_s + 0.25  # the service looks every tenth of a second
+            script.state(back_s, back_s + 0.9, cnc, arm=True)  # held: does nothing
+            for k in range(2):  # two edges: ready, monitor
+                script.state(back_s + 0.9 + 0.2 * k, back_s + 1.0 + 0.2 * k, cnc)
+                script.state(back_s + 1.0 + 0.2 * k, back_s + 1.1 + 0.2 * k, cnc, arm=True)
+            off_s = back_s + 1.3
+            script.samples(back_s, off_s)
+        with SerialBoard() as guest:
+            if LONG:
+                guest.deadline += 7200
+            wire, errors = guest.play_wire(script)
+            log = guest.stop(guest.service)
+            alarms = guest.edges(ALARM, guest.line_changes())
+        self.assertEqual(len(errors), len(delays_s))
+        commands = [f.time_s for f in wire if f.frame == command("sb000255")]
+        overrides = [f for f in wire if f.identifier == OVERRIDE]
+        reactions, stale, waited = [], 0, []
+        for error, told_s, next_s in zip(errors, commands, [*commands[1:], float("inf")]):
+            reactions.append(first_after(error.time_s, alarms) - error.time_s)
+            before = [f for f in overrides if f.time_s < told_s]
+            after = [f for f in overrides if told_s < f.time_s < next_s]
+            waited.append(after[0].time_s - told_s)
+            held = [f for f in after if f.time_s < after[0].time_s + 0.7]
+            stale += sum((f.state, f.reason) != ("link_lost", "bus_down") for f in held)
+            # One frame may have been in the controller when it went off.
+            self.assertIn((after[0].counter - before[-1].counter) & 0xFF, (1, 2))
+            self.assertEqual(
+                course(after), [("link_lost", "bus_down"), ("ready", "none"), ("monitor", "none")]
+            )
+        figure("bus_off_reaction_worst", f"{1e3 * max(reactions):.2f}", "ms from the error frame")
+        figure("bus_off_recoveries", len(errors), "times")
+        figure("bus_off_stale_frames", stale, "frames")
+        figure("bus_off_waited", " ".join(f"{time_s:.2f}" for time_s in waited[:4]), "s")
+        self.assertLess(max(reactions), 1.5 * TICK_S)
+        self.assertEqual(stale, 0)
+        for delay_s, time_s in zip(delays_s, waited):
+            self.assertGreaterEqual(time_s, delay_s)
+            self.assertLess(time_s, delay_s + 0.25)
+        self.assertIn(f"restarts of the bus {len(delays_s)}", "\n".join(log))
+
+    def test_that_does_not_read_is_noticed_by_what_cannot_be_sent(self):
+        cnc = Cnc()
+        script = Script("vcan0").state(0, 0.8, cnc).state(0.8, 6.0, cnc, arm=True).samples(0, 6.0)
+        script.frame(1.2, command("deaf")).frame(5.5, command("hear"))
+        with SerialBoard() as guest:
+            wire, _ = guest.play_wire(script)
+            guest.run("sleep 0.5")
+            log = guest.stop(guest.service)
+            states = [state for state, _ in guest.states()]
+        deaf_s = next(f.time_s for f in wire if f.frame == command("deaf"))
+        late = [f for f in wire if f.identifier == OVERRIDE and f.time_s > deaf_s + 4.3]
+        figure("bus_deaf_frames_in_adapter", sum(f.state == "monitor" for f in late), "frames, sent late")
+        print(states, course(wire), log[-3:])
+
+
 if __name__ == "__main__":
     unittest.main()

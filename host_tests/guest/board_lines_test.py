@@ -146,7 +146,7 @@ class TheLines(unittest.TestCase):
 
         # The same trace with one strobe before its data would not have passed.
         rises = [k for k, write in enumerate(writes) if write == (PL061_STROBE, 1)]
-        data = max(k for k in range(rises[1]) if writes[k][0] in DATA_LINES and writes[k][1])
+        data = max(k for k in range(rises[1]) if writes[k] == (DATA_LINES[1], 1))  # 5 becomes 6
         wrong = [*writes[:data], *writes[data + 1 : rises[1] + 1], writes[data], *writes[rises[1] + 1 :]]
         latch = Latch(DATA_LINES, PL061_STROBE).run(wrong)
         self.assertTrue(latch.wrong)

@@ -115,13 +115,14 @@ class Script:
 class Heard:
     """One line of candump -L."""
 
-    LINE = re.compile(r"\((\d+\.\d+)\) (\S+) ([0-9A-F]+)#(R?)([0-9A-F]*)")
+    LINE = re.compile(r"\((\d+\.\d+)\) +(\S+) ([0-9A-F]+)#(R?)([0-9A-F]*)")
 
     def __init__(self, line):
         found = self.LINE.match(line)
         if not found:
             raise ValueError(f"candump said '{line}'")
         self.time_s = float(found[1])
+        self.interface = found[2]
         self.frame = line.split()[2]
         self.identifier = int(found[3], 16)
         self.data = b"" if found[4] else bytes.fromhex(found[5])
