@@ -28,7 +28,10 @@ DRIVERS = (
     *("virtio", "pinctrl", "clk", "reset", "firmware", "mfd", "regulator", "dma", "rtc", "phy"),
     *("bus", "mailbox", "nvmem", "pwm", "soc", "tty/serial"),
 )
-MODULES = ("can", "can-raw", "ext4", "crc32c_generic", "virtio_blk", "sd_mod", "uas", "vcan", "slcan")
+MODULES = (
+    *("can", "can-raw", "vcan", "slcan", "virtio_blk", "sd_mod", "uas"),
+    *("ext4", "crc32c_generic", "vfat", "nls_cp437", "nls_ascii"),  # vfat: to replace the system
+)
 
 
 def modules():
