@@ -168,7 +168,8 @@ class AServedBoard(unittest.TestCase):
         figure("bus_worst_loop_in_flood", missed[3], "us")
         self.assertGreater(len(flooded) / 1.4, 2000)
         self.assertEqual(
-            course(frames)[-3:], [("ready", "none"), ("monitor", "none"), ("link_lost", "link_timeout")]
+            course(frames)[-3:],
+            [("ready", "none"), ("monitor", "none"), ("link_lost", "link_timeout")],
         )
         self.assertGreater(reaction_s, LINK_TIMEOUT_S - TICK_S)
         self.assertLess(reaction_s, LINK_TIMEOUT_S + 3 * TICK_S)
@@ -222,8 +223,9 @@ class AServedBoard(unittest.TestCase):
             log = "\n".join(guest.stop(service))
             alarms = guest.edges(ALARM, guest.line_changes())
         down_s = next(f.time_s for f in frames if f.identifier == 0x7FE)
-        figure("bus_down_reaction", f"{1e3 * (first_after(down_s, alarms) - down_s):.1f}", "ms, ip link included")
-        self.assertLess(first_after(down_s, alarms) - down_s, 0.05)
+        reaction_s = first_after(down_s, alarms) - down_s
+        figure("bus_down_reaction", f"{1e3 * reaction_s:.1f}", "ms, those of ip link included")
+        self.assertLess(reaction_s, 0.1)
         back = [f for f in frames if f.identifier == OVERRIDE and f.time_s > down_s + 0.05]
         figure("bus_down_until_restart", f"{1e3 * (back[0].time_s - down_s):.0f}", "ms")
         self.assertEqual((back[0].state, back[0].reason), ("link_lost", "bus_down"))
@@ -267,8 +269,8 @@ class AnErrorFrame(unittest.TestCase):
     QUIET_S = 0.21  # after which a missing acknowledge is believed; the link times out at 0.25 s
 
     def play(self, guest, errors, quiet_s=0.0):
-        """Each error a tenth of a second after the one before, in monitor; `quiet_s` after all other
-        frames."""
+        """Each error a tenth of a second after the one before, in monitor; the first one `quiet_s`
+        after all other frames."""
         cnc = Cnc()
         end_s = 1.2 + 0.1 * len(errors)
         script = Script("vcan0").state(0, 0.8, cnc).state(0.8, end_s, cnc, arm=True)
@@ -357,7 +359,7 @@ class ASerialAdapter(unittest.TestCase):
         self.assertLess(reaction_s, 1.5 * TICK_S)
 
     def test_that_goes_off_comes_back_after_longer_and_longer_delays_without_a_stale_frame(self):
-        delays_s = [0.1, 1.0] + [10.0] * (998 if LONG else 2)
+        delays_s = [0.1, 1.0] + [10.0] * (998 if LONG else 1)  # LONG: some hours
         cnc = Cnc()
         script = Script("vcan0").state(0, 0.8, cnc).state(0.8, 1.2, cnc, arm=True).samples(0, 1.2)
         off_s, offs = 1.2, []
@@ -373,7 +375,7 @@ class ASerialAdapter(unittest.TestCase):
             script.samples(back_s, off_s)
         with SerialBoard() as guest:
             if LONG:
-                guest.deadline += 7200
+                guest.deadline += 8 * 3600
             wire, errors = guest.play_wire(script)
             log = guest.stop(guest.service)
             alarms = guest.edges(ALARM, guest.line_changes())
@@ -410,13 +412,21 @@ class ASerialAdapter(unittest.TestCase):
         script.frame(1.2, command("deaf")).frame(5.5, command("hear"))
         with SerialBoard() as guest:
             wire, _ = guest.play_wire(script)
-            guest.run("sleep 0.5")
             log = guest.stop(guest.service)
-            states = [state for state, _ in guest.states()]
+            alarms = guest.edges(ALARM, guest.line_changes())
+            states = guest.states()
         deaf_s = next(f.time_s for f in wire if f.frame == command("deaf"))
-        late = [f for f in wire if f.identifier == OVERRIDE and f.time_s > deaf_s + 4.3]
-        figure("bus_deaf_frames_in_adapter", sum(f.state == "monitor" for f in late), "frames, sent late")
-        print(states, course(wire), log[-3:])
+        hear_s = next(f.time_s for f in wire if f.frame == command("hear"))
+        lost_s = first_after(deaf_s, alarms) - deaf_s
+        figure("bus_deaf_reaction", f"{1e3 * lost_s:.0f}", "ms")
+        late = [f for f in wire if f.identifier == OVERRIDE and f.time_s >= hear_s]
+        figure("bus_deaf_sent_late", sum(f.state == "monitor" for f in late), "frames")
+        self.assertLess(lost_s, LINK_TIMEOUT_S)  # by 200 ms without room, not by the CNC's silence
+        self.assertIn("nobody answers", next(why for state, why in states if state == "link_lost"))
+        # Of what the board sent, the adapter's buffer had one frame: nobody can take it back.
+        self.assertLessEqual(sum(f.state == "monitor" for f in late), 1)
+        self.assertEqual((late[-1].state, late[-1].reason), ("link_lost", "bus_down"))
+        self.assertRegex("\n".join(log), r"missed 0,.*restarts of the bus [1-9]")
 
 
 if __name__ == "__main__":

@@ -17,7 +17,8 @@ using cutforce::hal::os::GpioByte;
 bool put(GpioByte& bytes, unsigned byte, unsigned& count) {
   ++count;
   return bytes
-      .write({.byte = static_cast<std::uint8_t>(byte), .alive = false, .alarm = false, .again = true})
+      .write(
+          {.byte = static_cast<std::uint8_t>(byte), .alive = false, .alarm = false, .again = true})
       .has_value();
 }
 

@@ -83,7 +83,7 @@ class TheImage(unittest.TestCase):
             board.shell("tail -n 1 /data/cutforce/lathe.toml; ls /data/cutforce/traces | wc -l")
             board.wait_for("^# by hand")
             # As toolchain/board/IMAGE.md has it for an update.
-            board.shell("mkdir /run/system; mount -t vfat /dev/vda1 /run/system && ls /run/system/EFI/*")
+            board.shell("mkdir /run/new; mount -t vfat /dev/vda1 /run/new && ls /run/new/EFI/*")
             board.wait_for("^BOOTAA64.EFI")
             board.switch_off()
             self.assertFalse([line for line in board.lines if "cutforce: wrote" in line])

@@ -1,5 +1,5 @@
-"""A guest in which the service runs, and what can be seen of it from outside: its log, the alarm and
-alive lines of the bench module with their times, the frames on the bus.
+"""A guest in which the service runs, and what can be seen of it from outside: its log, the lines of
+the bench module with their times, the frames on the bus.
 
 All times are the guest's CLOCK_REALTIME in seconds, as candump tells them.
 """
@@ -84,8 +84,8 @@ class ServedBoard(Guest):
         return self.start("cutforced /etc/board.toml 2> /tmp/log")
 
     def play(self, script, beside=":", listen=None, after_s=0.1):
-        """Plays a script of frames while candump listens (to `listen`, as candump names it); what it
-        heard. `beside`: shell that starts with the first frame."""
+        """Plays a script of frames while candump listens (to `listen`, as candump names it); what
+        it heard. `beside`: shell that starts with the first frame."""
         script.write(self.share / "script")
         # While it waits for this machine's file system, a guest that counts instructions lets time
         # fly: nothing on /share is read once time matters.

@@ -1,5 +1,6 @@
 // A CAN adapter in user space behind the kernel's own slcan driver, for what no emulated controller
-// can do: no acknowledge, error warnings, bus-off, an adapter that does not read. Runs in the guest.
+// can do: no acknowledge, error warnings, bus-off, an adapter that does not read. Runs in the
+// guest.
 //
 //   slcan_adapter WIRE      prints the name of the new interface, then serves until it is killed
 //
