@@ -178,7 +178,8 @@ class AServedBoard(unittest.TestCase):
     def test_is_safe_while_another_node_has_its_identifiers(self):
         for identifier in (OVERRIDE, HEARTBEAT):
             with self.subTest(identifier=hex(identifier)):
-                self.meet_a_twin(text(identifier, bytes(8 if identifier == OVERRIDE else 1)))
+                length = 8 if identifier == OVERRIDE else 1
+                self.meet_a_twin(text(identifier, b"\1" * length))  # the board sends no such thing
 
     def meet_a_twin(self, twin):
         cnc = Cnc()

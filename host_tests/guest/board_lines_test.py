@@ -169,7 +169,7 @@ class TheLines(unittest.TestCase):
         asked = {"arm": True, "control": True, "at_speed": True}
         script = Script("can1").state(0, 0.8, cnc).state(0.8, 1.0, cnc, arm=True, at_speed=True)
         script.state(1.0, 3.0, cnc, **asked).samples(0, 3.0)
-        twin = "701#00"
+        twin = "701#01"  # no state of ours
         script.frame(2.2, twin)
         level = f"\\{1 << INHIBIT - 8:03o}"
         inhibit = (
