@@ -4,7 +4,7 @@ PL061's registers, the pins themselves, and the log of the bench module's lines.
 import re
 import unittest
 
-from can_script import Cnc, Script
+from can_script import OVERRIDE, Cnc, Script
 from guest import Guest
 from served_board import ALIVE, CHANGE, INHIBIT, STROBE, ServedBoard, figure, machine_file, programs
 
@@ -143,7 +143,7 @@ class TheLines(unittest.TestCase):
         self.assertEqual([levels >> line & 1 for line in DATA_LINES], [0, 0, 0, 1])
         driven = (*DATA_LINES, PL061_STROBE, PL061_ALIVE)
         self.assertEqual(outputs, sum(1 << line for line in driven))
-        self.assertEqual(frames[-1].override_pct, 70)
+        self.assertEqual([f.override_pct for f in frames if f.identifier == OVERRIDE][-1], 70)
 
         # The same trace with one strobe before its data would not have passed.
         rises = [k for k, write in enumerate(writes) if write == (PL061_STROBE, 1)]
@@ -184,7 +184,7 @@ class TheLines(unittest.TestCase):
             guest.stop(service)
         said = []
         for frame in frames:
-            if frame.identifier == 0x181 and (frame.state, frame.reason) not in said[-1:]:
+            if frame.identifier == OVERRIDE and (frame.state, frame.reason) not in said[-1:]:
                 said.append((frame.state, frame.reason))
         self.assertEqual(
             said[-5:],
@@ -194,7 +194,7 @@ class TheLines(unittest.TestCase):
             ],
         )
         inhibited_s = next(f.time_s for f in frames if f.identifier == 0x7FE)
-        held_s = next(f.time_s for f in frames if f.identifier == 0x181 and f.state == "hold")
+        held_s = next(f.time_s for f in frames if f.identifier == OVERRIDE and f.state == "hold")
         reaction_s = held_s - inhibited_s
         figure("lines_inhibit_reaction", f"{1e3 * reaction_s:.1f}", "ms, the shell's included")
         self.assertLess(reaction_s, 0.05)
