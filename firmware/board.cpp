@@ -138,6 +138,16 @@ void Board::note_turning(const hal::Sample& sample) noexcept {
   }
 }
 
+// Long enough that a reset finds the other node gone, and not just between two of its frames.
+void Board::note_foreign() noexcept {
+  if (link_.fetch_foreign()) {
+    own_.foreign_steps =
+        static_cast<std::uint32_t>(kForeignMemory_s / config_.supervisor.period_s) + 1;
+  } else if (own_.foreign_steps > 0) {
+    --own_.foreign_steps;
+  }
+}
+
 bool Board::checks_passed() const noexcept {
   if (!own_.health.ports_open || (own_.health.has_bus && is_down(own_.health.bus))) return false;
   const float expected_hz = 1e9F / static_cast<float>(config_.sample_period_ns);
@@ -173,6 +183,7 @@ control::Permission Board::permission() const noexcept {
 }
 
 void Board::supervise(const LoopOutput* output) noexcept {
+  note_foreign();
   const CncLink::State& cnc = link_.state();
   const hal::can::MachineState said = cnc.machine.value_or(hal::can::MachineState{});
   const bool has_force =
@@ -182,7 +193,7 @@ void Board::supervise(const LoopOutput* output) noexcept {
                                    .self_test_passed = own_.health.self_test_passed,
                                    .checks_passed = checks_passed(),
                                    .output_failed = own_.health.output_failed,
-                                   .foreign = cnc.foreign,
+                                   .foreign = own_.foreign_steps > 0,
                                    .stop = own_.health.stop,
                                    .missed_ticks = own_.health.missed_ticks,
                                    .machine_state_new = link_.fetch_new(),

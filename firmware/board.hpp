@@ -69,6 +69,8 @@ class Board {
   // Without a sample for so long, the clock goes on for them.
   static constexpr std::int64_t kSilence_ns = 20'000'000;
   static constexpr std::int64_t kAliveHalfPeriod_ns = 20'000'000;
+  // Another node with our identifiers is there for so long after its last frame: ten heartbeats.
+  static constexpr float kForeignMemory_s = 1.0F;
 
   // Fails iff a part refuses its config, the node is not 1..127, or the limit is not above the
   // reference.
@@ -116,6 +118,7 @@ class Board {
     std::uint32_t lost_samples = 0;
     std::uint32_t alive = 0;
     std::uint32_t signals_refused = 0;
+    std::uint32_t foreign_steps = 0;  // left of kForeignMemory_s
     std::uint32_t tool = 0;
     float first_gain_n_pct = 0.0F;  // of the tool that is in now
     float turning = 0.0F;           // the way the spindle turned when the board was armed, +-1
@@ -132,6 +135,7 @@ class Board {
   void note_rate(std::int64_t now_ns) noexcept;
   void note_wear(const LoopOutput& output) noexcept;
   void note_turning(const hal::Sample& sample) noexcept;
+  void note_foreign() noexcept;
   [[nodiscard]] bool checks_passed() const noexcept;
   [[nodiscard]] bool stopping(const BoardHealth& health) const noexcept;
   [[nodiscard]] control::Permission permission() const noexcept;

@@ -49,6 +49,12 @@ bool CncLink::fetch_new() noexcept {
   return is_new;
 }
 
+bool CncLink::fetch_foreign() noexcept {
+  const bool foreign = state_.foreign;
+  state_.foreign = false;
+  return foreign;
+}
+
 void CncLink::forget() noexcept {
   state_.machine.reset();
   state_.job.reset();

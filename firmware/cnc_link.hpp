@@ -22,7 +22,7 @@ class CncLink {
     std::optional<hal::can::Job> job;
     std::uint32_t refused = 0;  // wrong CRC, counter, length or range
     bool is_new = false;        // a MachineState since the last fetch_new()
-    bool foreign = false;       // somebody else sends with our identifiers
+    bool foreign = false;       // a frame with our identifiers since the last fetch_foreign()
   };
 
   explicit CncLink(std::uint8_t node) noexcept : node_(node) {}
@@ -31,6 +31,8 @@ class CncLink {
 
   // True once for each time that new MachineState has come.
   [[nodiscard]] bool fetch_new() noexcept;
+  // Likewise for frames with our own identifiers from somebody else.
+  [[nodiscard]] bool fetch_foreign() noexcept;
   // Nothing that was said before counts any more; the guards stay.
   void forget() noexcept;
 

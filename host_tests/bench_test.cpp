@@ -137,6 +137,27 @@ TEST(Bench, GivesControlAgainAfterAnOperatorHasAcknowledged) {
   EXPECT_TRUE(ran.bench.heard().override->enabled);
 }
 
+// Another node with the board's identifiers costs an acknowledgement, not a restart.
+TEST(Bench, GivesControlAgainAfterATwinOfTheBoardWasTakenAway) {
+  auto config = bench_config();
+  config.cnc.rearm = true;
+  bool seen = false;
+  const auto ran = run(config, [&seen](BenchTogether& together) {
+    const std::int64_t from_ns = together.clock_ns + 4'000'000'000;
+    auto& board = together.board;
+    together.to_bench = [from_ns, &board, &seen](Frame&, std::int64_t now_ns) {
+      if (now_ns > from_ns && now_ns < from_ns + 500'000'000) {
+        static_cast<void>(board.receive(pack(hal::can::Heartbeat{.nmt_state = 5}, 1), now_ns));
+      }
+      seen = seen || board.supervision().reason == control::Reason::kForeign;
+      return true;
+    };
+  });
+  EXPECT_TRUE(seen);
+  EXPECT_EQ(ran.bench.row().cnc.state, CncState::kFollowing);
+  EXPECT_TRUE(ran.bench.heard().override->enabled);
+}
+
 TEST(Bench, CountsWhatIsWrongWithFramesByItsKind) {
   const auto ran = run(
       bench_config(),

@@ -130,8 +130,18 @@ TEST(CanBusMonitor, TakesAnEchoForAnAcknowledgeOnlyWhereTheControllerGivesIt) {
 TEST(CanBusMonitor, TakesAFrameFromElsewhereForProofOfAReceiver) {
   CanBusMonitor monitor(false);
   monitor.error_frame(read_error_frame(CAN_ERR_ACK, {}), 0);
-  monitor.foreign_frame();
+  EXPECT_FALSE(monitor.acknowledged());
+  monitor.foreign_frame(1 * kMs);
   EXPECT_TRUE(monitor.acknowledged());
+}
+
+TEST(CanBusMonitor, BelievesNoMissingAcknowledgeWhileSomebodyTalks) {
+  CanBusMonitor monitor(false);
+  monitor.foreign_frame(1000 * kMs);
+  monitor.error_frame(read_error_frame(CAN_ERR_ACK, {}), 1199 * kMs);
+  EXPECT_TRUE(monitor.acknowledged());
+  monitor.error_frame(read_error_frame(CAN_ERR_ACK, {}), 1200 * kMs);
+  EXPECT_FALSE(monitor.acknowledged());
 }
 
 TEST(CanBusMonitor, CountsWhatTheControllerLost) {

@@ -107,6 +107,7 @@ void ControlThread::run() {
   health.self_test_done = health.self_test_passed = health.ports_open = true;
   std::uint64_t missed = 0;
   std::uint64_t farewell = 0;
+  control::Supervisor::Output told{};  // boot, without a reason
   for (std::uint64_t tick = 1; farewell < kFarewellTicks; ++tick) {
     health.missed_ticks = timer.wait().missed;
     missed += health.missed_ticks;
@@ -114,7 +115,9 @@ void ControlThread::run() {
                   (settings_.ticks != 0 && tick > settings_.ticks);
     const std::int64_t began_ns = hal::os::monotonic_ns();
     const BoardOutput output = cycle.run(began_ns, health, keep);
-    if (output.supervision.changed) {
+    // Against what was told, not by the step's own `changed`: one tick may be several steps.
+    if (output.supervision.state != told.state || output.supervision.reason != told.reason) {
+      told = output.supervision;
       shared_.changes.push({.time_ns = began_ns,
                             .state = output.supervision.state,
                             .reason = output.supervision.reason,

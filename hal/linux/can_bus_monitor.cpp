@@ -64,7 +64,7 @@ void CanBusMonitor::error_frame(const CanErrorNews& news, std::int64_t now_ns) n
   if (news.overrun) ++overruns_;
   if (news.counters) counters_ = *news.counters;
   if (news.no_acknowledge) {
-    acknowledged_ = false;
+    if (!last_foreign_ns_ || now_ns - *last_foreign_ns_ >= kQuietNs) acknowledged_ = false;
     last_missing_ns_ = now_ns;
   }
   if (news.state && usable()) state_ = *news.state;

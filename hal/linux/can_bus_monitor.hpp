@@ -34,7 +34,12 @@ class CanBusMonitor {
       : echo_proves_acknowledge_(echo_proves_acknowledge) {}
 
   void error_frame(const CanErrorNews& news, std::int64_t now_ns) noexcept;
-  void foreign_frame() noexcept { acknowledged_ = true; }  // who talks also acknowledges
+  // Who talks also acknowledges: a missing acknowledge counts only where nobody was heard for 200 ms.
+  // Otherwise it would hang on the order in which frame and error were read within one tick.
+  void foreign_frame(std::int64_t now_ns) noexcept {
+    acknowledged_ = true;
+    last_foreign_ns_ = now_ns;
+  }
   void heard_back(std::int64_t now_ns) noexcept;
   void unacknowledged() noexcept { acknowledged_ = false; }
   void down() noexcept;
@@ -55,6 +60,7 @@ class CanBusMonitor {
   bool acknowledged_ = true;
   bool echo_proves_acknowledge_;
   std::int64_t last_missing_ns_ = 0;
+  std::optional<std::int64_t> last_foreign_ns_{};
   std::uint32_t error_frames_ = 0;
   std::uint32_t overruns_ = 0;
   std::array<std::uint8_t, 2> counters_{};

@@ -149,7 +149,7 @@ struct SocketCan::Impl {
     frame = from_kernel(raw);
     frame.own = (flags & MSG_CONFIRM) != 0;
     if (!frame.own) {
-      monitor.foreign_frame();
+      monitor.foreign_frame(now_ns);
     } else if (gate.heard_back(frame)) {
       monitor.heard_back(now_ns);
     }

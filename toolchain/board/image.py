@@ -1,4 +1,4 @@
-"""Parts of the board image, for image.sh: image.py SERVICE MACHINE_FILE FOLDER
+"""Parts of the board image, for image.sh: image.py SERVICE FOLDER
 
 Writes FOLDER/esp/EFI/BOOT/BOOTAA64.EFI, a unified kernel image: systemd's stub with the kernel, its
 command line and the initial file system as sections, which is the whole system. Same input, same
@@ -28,7 +28,10 @@ DRIVERS = (
     *("virtio", "pinctrl", "clk", "reset", "firmware", "mfd", "regulator", "dma", "rtc", "phy"),
     *("bus", "mailbox", "nvmem", "pwm", "soc", "tty/serial"),
 )
-MODULES = ("can", "can-raw", "ext4", "crc32c_generic", "virtio_blk", "sd_mod", "uas", "vcan", "slcan")
+MODULES = (
+    *("can", "can-raw", "vcan", "slcan", "virtio_blk", "sd_mod", "uas"),
+    *("ext4", "crc32c_generic", "vfat", "nls_cp437", "nls_ascii"),  # vfat: to replace the system
+)
 
 
 def modules():
@@ -61,7 +64,7 @@ def add_modules(content):
     return len(paths)
 
 
-def file_system(service, machine_file):
+def file_system(service):
     content = Initramfs()
     for folder in ("proc", "sys", "dev", "run", "data", "sbin"):
         content.add_directory(folder)
@@ -84,8 +87,8 @@ def file_system(service, machine_file):
     for file in ("etc/inittab", "etc/start", "etc/stop", "bin/service"):
         content.add_file(file, HERE / "image" / file)
     content.add_program("/bin/cutforced", service)
-    content.add_file("/etc/cutforce/board.conf", HERE / "image/board.conf", 0o644)
-    content.add_file("/etc/cutforce/machine.toml", machine_file, 0o644)
+    for file in ("board.conf", "board.toml", "lathe.toml"):
+        content.add_file(f"/etc/cutforce/{file}", HERE / "image" / file, 0o644)
     count = add_modules(content)
     return content.archive(), count
 
@@ -119,8 +122,8 @@ def unified_kernel(initramfs, output):
 
 
 def main():
-    service, machine_file, folder = (pathlib.Path(argument) for argument in sys.argv[1:])
-    archive, count = file_system(service, machine_file)
+    service, folder = (pathlib.Path(argument) for argument in sys.argv[1:])
+    archive, count = file_system(service)
     packed = gzip.compress(archive, mtime=0)
     output = folder / "esp/EFI/BOOT/BOOTAA64.EFI"
     unified_kernel(packed, output)

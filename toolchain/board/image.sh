@@ -7,7 +7,6 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
 service=build/aarch64/firmware/linux/cutforced
-machine_file=toolchain/board/image/machine.toml
 if (($# == 1)) && [[ $1 == --placeholder ]]; then
   service=toolchain/board/image/bin/placeholder
 elif (($#)); then
@@ -23,7 +22,7 @@ folder=build/board/image
 rm -rf "$folder"
 # An empty data partition: mke2fs would copy the change times of files, which nobody can set.
 mkdir -p "$folder/root/data"
-/usr/bin/python3 toolchain/board/image.py "$service" "$machine_file" "$folder"
+/usr/bin/python3 toolchain/board/image.py "$service" "$folder"
 
 # One time and one identifier for everything that would take today's, or a random one.
 time=315532800  # 1980: FAT has no earlier
