@@ -137,7 +137,7 @@ TEST(Golden, HoldsTheForceThroughFramesBitForBit) {
   BenchTogether together{.bench = bench, .board = board};
   std::vector<LoopOutput> outputs;
   together.sink = [&outputs](const LoopOutput& row) { outputs.push_back(row); };
-  while (bench.now_ns() < 13'000'000'000) together.step();
+  while (bench.now_ns() <= 13'000'000'000) together.step();
   compare("closed_loop_bench_lathe", outputs);
 }
 
