@@ -62,6 +62,28 @@ class ArmedCount {
   bool armed_ = false;
 };
 
+// Of the state, from tick to tick: within one the supervisor may take several steps, and its own
+// `changed` is of the last.
+class Changes {
+ public:
+  explicit Changes(Shared& shared) noexcept : shared_(shared) {}
+
+  void note(std::int64_t now_ns, const control::Supervisor::Output& now) noexcept {
+    if (now.state == state_ && now.reason == reason_) return;
+    state_ = now.state;
+    reason_ = now.reason;
+    shared_.changes.push({.time_ns = now_ns,
+                          .state = now.state,
+                          .reason = now.reason,
+                          .override_pct = now.override_pct});
+  }
+
+ private:
+  Shared& shared_;
+  control::SupervisorState state_ = control::SupervisorState::kBoot;
+  control::Reason reason_ = control::Reason::kNone;
+};
+
 }  // namespace
 
 ControlThread::ControlThread(Board& board, Ports& ports, Shared& shared, Settings settings)
@@ -102,6 +124,7 @@ void ControlThread::run() {
                        .source = ports_.source ? &*ports_.source : nullptr});
   auto timer = hal::os::PeriodicTimer::start(settings_.tick_ns).value();
   ArmedCount armed(shared_);
+  Changes changes(shared_);
   const auto keep = [this](const LoopOutput& row) { shared_.rows.push(row); };
   BoardHealth health{};
   health.self_test_done = health.self_test_passed = health.ports_open = true;
@@ -114,12 +137,7 @@ void ControlThread::run() {
                   (settings_.ticks != 0 && tick > settings_.ticks);
     const std::int64_t began_ns = hal::os::monotonic_ns();
     const BoardOutput output = cycle.run(began_ns, health, keep);
-    if (output.supervision.changed) {
-      shared_.changes.push({.time_ns = began_ns,
-                            .state = output.supervision.state,
-                            .reason = output.supervision.reason,
-                            .override_pct = output.supervision.override_pct});
-    }
+    changes.note(began_ns, output.supervision);
     armed.tick(output, health.missed_ticks);
     const auto took_us = static_cast<std::uint32_t>((hal::os::monotonic_ns() - began_ns) / 1000);
     health.worst_loop_us = std::max(health.worst_loop_us, took_us);

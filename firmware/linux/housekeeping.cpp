@@ -44,6 +44,7 @@ void Housekeeping::feed() {
   const Progress now{.ticks = shared_.ticks.load(std::memory_order_relaxed),
                      .bus = shared_.bus_passes.load(std::memory_order_relaxed),
                      .samples = shared_.sample_passes.load(std::memory_order_relaxed)};
+  if (now.ticks == 0) return;  // the control thread is about to start
   const bool moved = now.ticks != fed_.ticks && now.bus != fed_.bus && now.samples != fed_.samples;
   if (!moved) {
     if (!starving_) {
