@@ -40,7 +40,9 @@ class ArmedCount {
   explicit ArmedCount(Shared& shared) noexcept : shared_(shared) {}
 
   void tick(const BoardOutput& output, std::uint32_t missed) noexcept {
-    if (!armed_ && output.supervision.state < control::SupervisorState::kMonitor) return;
+    using control::SupervisorState;
+    const SupervisorState now_in = output.supervision.state;
+    if (!armed_ && (now_in < SupervisorState::kMonitor || now_in > SupervisorState::kHold)) return;
     const ThreadCounts now = thread_counts();
     if (!armed_) {
       armed_ = true;

@@ -22,7 +22,8 @@ LONG = "CUTFORCE_LONG" in os.environ
 
 MARK = 0x7E0  # sent by a test, to have an instant in the log
 OVERRIDE, MACHINE_STATE, PHASES, EMERGENCY = 0x181, 0x201, 0x101, 0x081
-STROBE, ALIVE, ALARM = 8, 9, 10  # of the bench's chip; 0 to 7 are the data, 11 is the inhibit
+# Of the bench's chip; 0 to 7 are the data, 11 is the inhibit. Nothing is wired to the last one.
+STROBE, ALIVE, ALARM, MARKED = 8, 9, 10, 15
 
 BOARD = """machine = "machine.toml"
 [can]
@@ -122,6 +123,24 @@ def decode(frame):
     return known.name, {name: float(signal.phys_value) for name, signal in signals.items()}
 
 
+def encode(name, **codes):
+    """Data of a message by the codes of its signals; those that are not given are 0."""
+    import check_dbc  # pylint: disable=import-outside-toplevel
+
+    known = next(message for message in dbc().values() if message.name == name)
+    data = known.signals_to_bytes({signal.name: 0 for signal in known.signals} | codes)
+    if check_dbc.guarded(known):
+        data[0:2] = check_dbc.crc(known.arbitration_id.id, data).to_bytes(2, "little")
+    return f"{known.arbitration_id.id:03X}#{bytes(data).hex().upper()}"
+
+
+def endless_log(name, period_s, counter, **codes):
+    """For canplayer -l i: 256 frames of a message, whose counter goes on where it begins anew."""
+    return "".join(
+        f"({k * period_s:.6f}) can1 {encode(name, **codes, **{counter: k})}\n" for k in range(256)
+    )
+
+
 class Lines:
     """What a receiver at the bench's lines sees: a byte counts where the strobe rises."""
 
@@ -130,10 +149,13 @@ class Lines:
     def __init__(self, log):
         self.bytes, self.alive, self.alarm, self.changes = [], [], [], []
         level = [0] * 16
+        self.marks = []
         for time_ns, line, now in self.CHANGE.iter_unpack(log):
             assert line < 16, f"{now} changes were lost"
             self.changes.append((time_ns * 1e-9, line, now))
             level[line] = now
+            if line == MARKED:
+                self.marks.append(time_ns * 1e-9)
             if line == STROBE and now:
                 byte = sum(bit << place for place, bit in enumerate(level[:8]))
                 self.bytes.append((time_ns * 1e-9, byte))

@@ -4,7 +4,6 @@ lathe and its acquisition node, on the other controller of the same bus."""
 import csv
 import gzip
 import json
-import math
 import unittest
 
 import board
@@ -110,15 +109,19 @@ class TheLoop(unittest.TestCase):
 
     def check_reaction(self, frames, begin, bench):
         """Control ticks from the first sample of the greater depth to the first lower override."""
+        def tick(time_s):
+            return round(1e6 * time_s) // round(1e6 * CONTROL_TICK_S)
+
         rows = table(bench)[0]
         before = [row for row in rows if 0 < float(row["depth_m"]) < STEP_M][-1]
         step_s = float(before["t_s"])  # the step comes within 10 ms of it
-        zero_s = next(f for f in begin if f.identifier == board.PHASES).time_s
+        phases = [frame.time_s for frame in begin if frame.identifier == board.PHASES]
+        zero_s = min(time_s - 1e-3 * k for k, time_s in enumerate(phases))  # one may be late
         was = float(before["override_pct"])
         said = [(f.time_s - zero_s, decode(f)[1]["OverridePct"]) for f in frames
                 if f.identifier == board.OVERRIDE]
         fell_s = next(time_s for time_s, pct in said if time_s > step_s and pct < was)
-        ticks = math.floor(fell_s / CONTROL_TICK_S) - math.floor(step_s / CONTROL_TICK_S)
+        ticks = tick(fell_s) - tick(step_s)
         figure("force_step_to_override_frame", ticks, "control ticks")
         figure("force_step_to_override_frame_at_most", 1e3 * (fell_s - step_s), "ms")
         figure("control_tick_to_override_frame", 1e3 * (fell_s % CONTROL_TICK_S), "ms")
