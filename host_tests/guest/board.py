@@ -70,17 +70,22 @@ def machine_text(scenario=LATHE, mode="control"):
 
 
 def files(text=BOARD, machine=None, more=None):
-    """What Guest puts into the guest. text: the board's file; more: name in /etc/cutforce to text."""
+    """What Guest puts into the guest. text: the board's file; more: name in /etc/cutforce to text,
+    or bytes."""
     texts = {"board.toml": text, "machine.toml": machine or machine_text(), **(more or {})}
-    texts = {f"/etc/cutforce/{name}": text.encode() for name, text in texts.items()}
+    texts = {
+        f"/etc/cutforce/{name}": text if isinstance(text, bytes) else text.encode()
+        for name, text in texts.items()
+    }
     return {**PROGRAMS, **texts, "/etc/bench_lathe.toml": LATHE.read_bytes()}
 
 
-def boot_board(script, text=BOARD, machine=None, more=None, **options):
+def boot_board(script, text=BOARD, machine=None, more=None, programs=None, **options):
     """A script in a guest of its own, with both buses up; the guest, which has ended, and what the
     script left in the shared folder: name to bytes."""
     options = {"icount": True, "timeout_s": 7200 if LONG else 400, **options}
-    with Guest(script=CAN_UP + script, files=files(text, machine, more), **options) as guest:
+    wanted = {**files(text, machine, more), **(programs or {})}
+    with Guest(script=CAN_UP + script, files=wanted, **options) as guest:
         status = guest.finish()
         left = {path.name: path.read_bytes() for path in guest.share.iterdir() if path.is_file()}
     if status != 0:

@@ -4,6 +4,10 @@ lathe and its acquisition node, on the other controller of the same bus."""
 import csv
 import gzip
 import json
+import pathlib
+import re
+import struct
+import tempfile
 import unittest
 
 import board
@@ -140,6 +144,99 @@ class TheLoop(unittest.TestCase):
             names |= {decode(frame)[0] for frame in heard}
         self.assertEqual(names, {message.name for message in dbc().values()})
         figure("frame_types_both_ways", len(names), "")
+
+
+# Volts at the converter to 5 V in 16 bits; the speed is a voltage there too, and the power is what the
+# drive says, in watts.
+SCALE = 0.152587890  # mV a count
+WIRED = {"voltage_v_v": 100, "current_a_v": 40, "speed_rad_s_v": 100, "power_meter_w_v": 1e6}
+BY_IIO = board.BOARD.replace('source = "can"', 'source = "iio"') + f"""[iio]
+device = "cutforce-adc"
+voltage = ["in_voltage0", "in_voltage1", "in_voltage2"]
+current = ["in_voltage3", "in_voltage4"]
+speed = "in_voltage5"
+power_meter = "in_power"
+{"".join(f"{key} = {value}{chr(10)}" for key, value in WIRED.items())}
+[trace]
+folder = "/tmp/trace"
+"""
+RATE_HZ = 5000
+RECORDED_S = 5
+# Column of the recording: its place in a scan, and the SI value of a count there.
+MILLI = 1e-3
+COLUMNS = {
+    "v_un_v": (0, SCALE * (MILLI * WIRED["voltage_v_v"])),
+    "v_vn_v": (1, SCALE * (MILLI * WIRED["voltage_v_v"])),
+    "v_wn_v": (2, SCALE * (MILLI * WIRED["voltage_v_v"])),
+    "i_u_a": (3, SCALE * (MILLI * WIRED["current_a_v"])),
+    "i_v_a": (4, SCALE * (MILLI * WIRED["current_a_v"])),
+    "speed_rad_s": (5, SCALE * (MILLI * WIRED["speed_rad_s_v"])),
+    "power_meter_w": (7, 1e-3 * (MILLI * WIRED["power_meter_w_v"])),
+}
+SAMPLED = f"""
+echo {SCALE:.9f} > /sys/bus/iio/devices/iio:device0/in_voltage_scale
+echo {RATE_HZ} > /sys/bus/iio/devices/iio:device0/sampling_frequency
+cutforced /etc/cutforce/board.toml > /share/service 2>&1 & service=$!
+candump -n 1 can1,181:7FF > /dev/null
+cutforce_feeder /etc/cutforce/scans {RATE_HZ // 1000} || exit 3
+sleep 0.1
+kill -TERM $service; wait $service || exit 4
+cat /sys/module/cutforce_bench/parameters/scans_lost > /share/lost
+cp /tmp/trace/* /share
+"""
+
+
+def single(value):
+    """The nearest number in single precision, in digits that lead back to it."""
+    return f"{struct.unpack('<f', struct.pack('<f', value))[0]:.9g}"
+
+
+def estimates(trace):
+    """Rows, but for the override: that of a board that nobody armed is neutral."""
+    return [{k: v for k, v in row.items() if k != "override_pct"} for row in table(trace)[0]]
+
+
+class SampledSignals(unittest.TestCase):
+    def test_give_the_estimates_of_a_replay_of_the_same_samples(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            scenario = board.LATHE.read_text(encoding="utf-8")
+            scenario = re.sub("(?m)^sample_rate_hz = .*$", f"sample_rate_hz = {RATE_HZ}", scenario)
+            scenario = re.sub("(?m)^duration_s = .*$", f"duration_s = {RECORDED_S}", scenario)
+            (folder / "lathe.toml").write_text(scenario, encoding="utf-8")
+            board.cutforce("simulate", folder / "lathe.toml", "--out", folder)
+            scans = self.quantise(folder)
+            machine = (folder / "machine.toml").read_text(encoding="utf-8")
+            replayed = folder / "replayed.csv"
+            board.cutforce("replay", folder / "quantised.csv", "--machine",
+                           folder / "machine.toml", "--out", replayed)
+            wanted = estimates(replayed.read_text(encoding="utf-8"))
+        feeder = {"/bin/cutforce_feeder": board.BUILD / "host_tests/guest/cutforce_feeder"}
+        _, left = boot_board(SAMPLED, text=BY_IIO, machine=machine, more={"scans": scans},
+                             programs=feeder)
+        print(left["service"].decode())
+        self.assertEqual(left["lost"].strip(), b"0")
+        got = estimates(gzip.decompress(left["trace-000001.csv.gz"]).decode())
+        forces = [float(row["cutting_force_n"] or 0) for row in got]
+        self.assertEqual(got, wanted[: len(got)])
+        figure("control_ticks_by_iio_as_replayed", len(got), "")
+        figure("highest_force_by_iio", max(forces), "N")
+        self.assertGreaterEqual(len(got), len(wanted) - 1)
+        self.assertGreater(max(forces), 300)
+
+    def quantise(self, folder):
+        """Scans as the converter gives them; and their values as a recording, in the same folder."""
+        rows, _ = table(gzip.decompress((folder / "recording.csv.gz").read_bytes()).decode())
+        scans, lines = [], ["# cutforce recording 1", "t_s," + ",".join(COLUMNS)]
+        for k, row in enumerate(rows):
+            counts = [0] * 8
+            for name, (place, step) in COLUMNS.items():
+                counts[place] = max(-32768, min(32767, round(float(row[name]) / step)))
+            scans.append(struct.pack("<8hq", *counts, k * (10**9 // RATE_HZ)))
+            values = [single(counts[place] * step) for place, step in COLUMNS.values()]
+            lines.append(",".join([f"{k / RATE_HZ:.6f}", *values]))
+        (folder / "quantised.csv").write_text("\n".join(lines) + "\n", encoding="ascii")
+        return b"".join(scans)
 
 
 if __name__ == "__main__":
