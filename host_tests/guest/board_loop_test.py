@@ -55,7 +55,8 @@ def table(text):
 
 class TheLoop(unittest.TestCase):
     def test_holds_the_force_with_the_overrides_of_the_host_run(self):
-        guest, left = boot_board(LOOP + TYPES, text=board.BOARD + '[trace]\nfolder = "/tmp/trace"\n')
+        traced = board.BOARD + '[trace]\nfolder = "/tmp/trace"\n'
+        guest, left = boot_board(LOOP + TYPES, text=traced)
         print(left["service"].decode())
         frames = can_log(left["can.log"])
         lines = board.Lines(left["gpio.log"])
@@ -146,8 +147,8 @@ class TheLoop(unittest.TestCase):
         figure("frame_types_both_ways", len(names), "")
 
 
-# Volts at the converter to 5 V in 16 bits; the speed is a voltage there too, and the power is what the
-# drive says, in watts.
+# Volts at the converter to 5 V in 16 bits; the speed is a voltage there too, and the power is what
+# the drive says, in watts.
 SCALE = 0.152587890  # mV a count
 WIRED = {"voltage_v_v": 100, "current_a_v": 40, "speed_rad_s_v": 100, "power_meter_w_v": 1e6}
 BY_IIO = board.BOARD.replace('source = "can"', 'source = "iio"') + f"""[iio]
@@ -225,7 +226,7 @@ class SampledSignals(unittest.TestCase):
         self.assertGreater(max(forces), 300)
 
     def quantise(self, folder):
-        """Scans as the converter gives them; and their values as a recording, in the same folder."""
+        """Scans as the converter gives them, and their values as a recording in that folder."""
         rows, _ = table(gzip.decompress((folder / "recording.csv.gz").read_bytes()).decode())
         scans, lines = [], ["# cutforce recording 1", "t_s," + ",".join(COLUMNS)]
         for k, row in enumerate(rows):

@@ -1,8 +1,9 @@
-"""The service's loop in the guest's own time: Debian's PREEMPT_RT kernel on one processor that counts
-instructions (4 ns each), with other load beside it. It finds a lock, a fault or a system call too
-many; of the caches, buses and firmware of a real board it knows nothing.
+"""The service's loop in the guest's own time: Debian's PREEMPT_RT kernel on one processor that
+counts instructions (4 ns each), with other load beside it. It finds a lock, a fault or a system call
+too many; of the caches, buses and firmware of a real board it knows nothing.
 
-CUTFORCE_LONG=1: 10^6 ticks, which take hours; else 20000.
+CUTFORCE_LONG=1 /usr/bin/python3 host_tests/guest/board_real_time_test.py: 10^6 ticks, some 40
+minutes; else 20000.
 """
 
 import re

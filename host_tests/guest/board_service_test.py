@@ -1,7 +1,8 @@
 """The service as a process in the emulated board: killed, told to end, stopped, started with what
 cannot be. Whatever happens, the override does not rise and nothing arms itself.
 
-CUTFORCE_LONG=1: 1000 restarts after kill -9; else one.
+CUTFORCE_LONG=1 /usr/bin/python3 host_tests/guest/board_service_test.py TheService: 1000 restarts
+after kill -9, some 30 minutes; else one.
 """
 
 import json
@@ -30,8 +31,8 @@ kill $listening; cp /tmp/can.log /share/can.log
 dd if=/dev/cutforce_gpio_log of=/share/gpio.log bs=8M count=1 2> /dev/null
 """
 
-# Killed in control, in the cut. Then there are samples, and a CNC whose arm and control are high all
-# along, over each restart; in the end it lowers and raises them, and the service is told to end.
+# Killed in control, in the cut. Then there are samples, and a CNC whose arm and control are high
+# all along, over each restart; in the end it lowers and raises them, and the service is told to end.
 KILLED = f"""
 {BEGIN}
 serve
