@@ -18,7 +18,7 @@ namespace cutforce::control {
 
 class AppliedOverride {
  public:
-  static constexpr std::size_t kHistory = 16;
+  static constexpr std::uint32_t kHistory = 16;
 
   enum class ConfigError : std::uint8_t { kDelay, kConfirm, kTolerance, kInitial };
 
@@ -51,7 +51,8 @@ class AppliedOverride {
   };
 
   struct State {
-    std::array<std::uint8_t, kHistory> sent_pct{};  // newest first
+    std::array<std::uint8_t, kHistory> sent_pct{};  // a ring, newest first from `newest` on
+    std::uint32_t newest = 0;
     std::uint32_t differing_ticks = 0;
   };
 
@@ -64,8 +65,8 @@ class AppliedOverride {
 
   // A report that is not within 0..255 % tells nothing.
   [[nodiscard]] constexpr Output step(const Input& input) noexcept {
-    for (std::size_t i = kHistory - 1; i > 0; --i) state_.sent_pct[i] = state_.sent_pct[i - 1];
-    state_.sent_pct[0] = input.sent_pct;
+    state_.newest = (state_.newest + kHistory - 1) % kHistory;
+    state_.sent_pct[state_.newest] = input.sent_pct;
 
     const bool told = input.reported && input.reported_pct >= 0.0F && input.reported_pct <= 255.0F;
     if (!told || follows(input.reported_pct)) {
@@ -90,8 +91,9 @@ class AppliedOverride {
     std::uint8_t lowest = 255;
     std::uint8_t highest = 0;
     for (std::size_t i = 0; i <= config_.delay_ticks; ++i) {
-      lowest = std::min(lowest, state_.sent_pct[i]);
-      highest = std::max(highest, state_.sent_pct[i]);
+      const std::uint8_t sent = state_.sent_pct[(state_.newest + i) % kHistory];
+      lowest = std::min(lowest, sent);
+      highest = std::max(highest, sent);
     }
     return reported_pct >= static_cast<float>(lowest) - config_.tolerance_pct &&
            reported_pct <= static_cast<float>(highest) + config_.tolerance_pct;
@@ -102,6 +104,6 @@ class AppliedOverride {
 };
 
 static_assert(std::is_trivially_copyable_v<AppliedOverride>);
-static_assert(sizeof(AppliedOverride::State) == 16 + 4);
+static_assert(sizeof(AppliedOverride::State) == 16 + 2 * 4);
 
 }  // namespace cutforce::control

@@ -66,7 +66,7 @@ class GainTracker {
     float gain_n;
     float gain_sigma_n;
     float trend;       // correlation of successive innovations, 0..1: the gain drifts
-    float innovation;  // in standard deviations
+    float innovation;  // in standard deviations; 0 while a jump is being followed
     bool jumped;       // with this reading
     bool resolving;    // a jump is being followed
     bool rising;       // the jump is upwards
@@ -137,7 +137,14 @@ class GainTracker {
   void begin_jump(const Input& input, float noise_n2) noexcept;
   void follow(float feed, float feed_sigma, float reading_n, float noise_n2,
               std::uint32_t tick) noexcept;
-  void conclude() noexcept;
+  struct Fit {
+    float sharpness;  // 1 / variance of the gain
+    float jump_n;     // of the gain
+    float misfit;     // sum of r^2 / R, with the prior's share
+  };
+  using Fits = std::array<Fit, kMoments>;
+  [[nodiscard]] Fits fit_moments() noexcept;
+  void conclude(const Fits& fits) noexcept;
   [[nodiscard]] bool follow_on(const Input& input, float noise_n2) noexcept;
   [[nodiscard]] bool surprises(const Input& input, float innovation,
                                float innovation_n) const noexcept;

@@ -6,6 +6,10 @@
 // cell holds e = (K / K_0)^(-1/p), so that e (F_r / (K_0 r))^(1/p) is the override that holds the
 // reference there, r being how much more the tool takes now than it did then.
 //
+// A cell that was passed is not asked for again before the next part, so what this part says of it
+// is merged in at once, as soon as its neighbours are known: one map instead of two, 4 kB less, and
+// no tick in which a whole part is merged, 200 000 instructions on a Cortex-M7.
+//
 // The map only ever lowers the override: it brakes before a cell that needs less, and says nothing
 // where the cut gets lighter. Where it makes the force stay far below the reference it is
 // wrong, and is not believed for the rest of the part.
@@ -64,24 +68,26 @@ class PathMap {
   };
 
   struct State {
-    std::array<std::uint16_t, kCells> learned{};   // of earlier parts; 0: nothing known
-    std::array<std::uint16_t, kCells> recorded{};  // of this part
-    float position_s = 0.0F;                       // of the tool, at 100 %
-    std::array<float, 2> earlier_s{};              // one and two ticks ago
-    float wear_ratio = 1.0F;
-    float last_gain_n = 0.0F;     // settled, before a jump
-    float doubt_s = 0.0F;         // the map has held the force down for
-    float doubt_from_s = 0.0F;    // and since this place
-    std::uint32_t resolving = 0;  // a jump is being followed
-    std::uint32_t rising = 0;     // which began upwards
-    std::uint32_t written = 0;    // cells of this part
-    std::uint32_t started = 0;    // 1: a part has begun
+    // Of earlier parts, and of this one up to two cells behind the last that was written; 0:
+    // nothing known.
+    std::array<std::uint16_t, kCells> learned{};
+    std::array<std::uint16_t, 5> recorded{};  // the last cells of this part, the latest last
+    std::uint16_t reserved = 0;
+    float position_s = 0.0F;           // of the tool, at 100 %
+    std::array<float, 2> earlier_s{};  // one and two ticks ago
+    float wear_feed_ratio = 1.0F;      // override that holds the reference now, over that of then
+    std::uint32_t last_cell = 0;       // of the gain that was settled, before a jump
+    float doubt_s = 0.0F;              // the map has held the force down for
+    float doubt_from_s = 0.0F;         // and since this place
+    std::uint32_t resolving = 0;       // a jump is being followed
+    std::uint32_t rising = 0;          // which began upwards
+    std::uint32_t written = 0;         // cells of this part
+    std::uint32_t started = 0;         // 1: a part has begun
     std::uint32_t trusted = 1;
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static constexpr std::expected<PathMap, ConfigError> make(
-      const Config& config) noexcept {
+  [[nodiscard]] static std::expected<PathMap, ConfigError> make(const Config& config) noexcept {
     if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
     return PathMap{config};
   }
@@ -99,17 +105,30 @@ class PathMap {
   // The override that the map allows; the wanted one where it has nothing against it.
   [[nodiscard]] float limit(const Question& question) noexcept;
 
+  // Whether limit() may have something against an override.
+  [[nodiscard]] bool limits() const noexcept { return state_.started != 0 && state_.trusted != 0; }
+
   [[nodiscard]] const State& state() const noexcept { return state_; }
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit constexpr PathMap(const Config& config) noexcept : config_(config) {}
+  explicit PathMap(const Config& config) noexcept;
 
-  [[nodiscard]] std::uint16_t cell_of(float gain_n) const noexcept;
-  void write_to(float position_s, float gain_n) noexcept;
+  [[nodiscard]] float feed_at_reference(float gain_n) const noexcept;
+  void write_to(float position_s, std::uint16_t cell) noexcept;
+  void believe(std::uint32_t cell, std::uint32_t count) noexcept;
+  void merge(std::uint32_t cell, std::uint32_t sum, std::uint32_t count) noexcept;
+  void follow_wear(float feed_now, float feed_then) noexcept;
   [[nodiscard]] float slowest(const Question& question, float scale_pct) const noexcept;
 
   Config config_;
+  float inverse_exponent_;  // 1/p
+  float wear_far_ratio_;    // bounds of the wear, in the domain of the feed
+  float wear_least_ratio_;
+  float wear_most_ratio_;
+  // The last reference and the override that holds it at K_0: it hardly ever changes.
+  float reference_n_ = 0.0F;
+  float reference_feed_ = 0.0F;
   State state_{};
 };
 

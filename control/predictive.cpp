@@ -87,7 +87,10 @@ Predictive::Predictive(const Config& config, const GainTracker& tracker, const P
       tracker_(tracker),
       map_(map),
       bank_(bank),
-      tick_(lag_step(config, config.period_s)) {
+      tick_(lag_step(config, config.period_s)),
+      inverse_exponent_(1.0F / config.feed_exponent),
+      forgets_ratio_(exp_bounded(-config.recovery_1_s * config.period_s)),
+      forgets_after_jump_ratio_(exp_bounded(-kAfterJump_1_s * config.period_s)) {
   assume_latency(config.latency_s);
   const std::array<float, kReaches> lengths{config.period_s, 2.0F * config.period_s,
                                             std::max(kMiddle_s, 2.0F * config.period_s),
@@ -99,8 +102,8 @@ Predictive::Predictive(const Config& config, const GainTracker& tracker, const P
                     .force = h.cut,
                     .feed = (h.feed - h.cut) * config.feed_lag_s / apart_s};
   }
-  state_.sent.fill(1.0F);
-  state_.feed.v = 1.0F;
+  own_.sent.fill(1.0F);
+  own_.feed.v = 1.0F;
 }
 
 void Predictive::assume_latency(float latency_s) noexcept {  // (C71)
@@ -117,14 +120,14 @@ void Predictive::find_latency(const Input& input, bool jumped) noexcept {
                       input.force_n > kTelling_ratio * input.force_reference_n;
   const float before_s = bank_.state().latency_s;
   const auto found =
-      bank_.step({.sent = state_.sent, .reading_n = input.force_n, .usable = usable});
+      bank_.step({.sent = {sent(), kHistory}, .reading_n = input.force_n, .usable = usable});
   if (found.latency_s != before_s) assume_latency(found.latency_s);
 }
 
 // Jumps up and down in turn are more likely our own moves, seen at the wrong time, than the part's:
 // then what a move may do at an unknown moment is believed to be more. (C106)
 void Predictive::doubt_timing(const GainTracker::Output& seen) noexcept {
-  State& s = state_;
+  Own& s = own_;
   s.timing_doubt += config_.period_s / kDoubtMemory_s * (1.0F - s.timing_doubt);
   if (!seen.jumped) return;
   const bool turned = (seen.rising ? 1U : 0U) != s.last_rising;
@@ -136,28 +139,34 @@ void Predictive::doubt_timing(const GainTracker::Output& seen) noexcept {
 
 // What the override did to the feed since the last tick: mean of v. (C70)-(C73)
 auto Predictive::known_feed(float applied_pct) noexcept -> KnownFeed {
-  State& s = state_;
-  const float now = applied_pct == s.sent_pct ? s.sent[0]
+  Own& s = own_;
+  const float now = applied_pct == s.sent_pct ? sent()[0]
                     : applied_pct > 0.0F
                         ? power_positive(0.01F * applied_pct, config_.feed_exponent)
                         : 0.0F;
-  for (std::size_t k = kHistory - 1; k > 0; --k) s.sent[k] = s.sent[k - 1];
-  s.sent[0] = now;
+  s.newest = (s.newest == 0 ? kHistory : s.newest) - 1;
+  s.sent[s.newest] = s.sent[s.newest + kHistory] = now;
   s.held_s = applied_pct == s.sent_pct ? s.held_s + config_.period_s : 0.0F;
   s.sent_pct = applied_pct;
-  const float first = s.feed.advance(early_, config_.feed_lag_s, s.sent[whole_ticks_ + 1]);
-  const float second = s.feed.advance(late_, config_.feed_lag_s, s.sent[whole_ticks_]);
-  const float step = s.sent[whole_ticks_] - s.sent[whole_ticks_ + 1];
+  const float before_w = sent()[whole_ticks_ + 1];
+  const float after_w = sent()[whole_ticks_];
+  const float first = s.feed.advance(early_, config_.feed_lag_s, before_w);
+  const float second = s.feed.advance(late_, config_.feed_lag_s, after_w);
+  const float step = after_w - before_w;
   return {.mean = (early_.length_s * first + late_.length_s * second) / config_.period_s,
           .sigma = estimator::magnitude(step) * config_.latency_sigma_s / config_.period_s};
 }
 
-float Predictive::feed_ratio(float w) const noexcept {
-  return w > 1e-4F ? power_positive(w, 1.0F / config_.feed_exponent) : 0.0F;
+float Predictive::feed_ratio(float w) noexcept {
+  if (w != asked_w_) {
+    asked_w_ = w;
+    answered_ratio_ = w > 1e-4F ? power_positive(w, inverse_exponent_) : 0.0F;
+  }
+  return answered_ratio_;
 }
 
 void Predictive::learn(const GainTracker::Output& seen, float feed, CutPhase phase) noexcept {
-  const bool settled = state_.since_jump_s > kLost_s && phase == CutPhase::kCut;
+  const bool settled = own_.since_jump_s > kLost_s && phase == CutPhase::kCut;
   map_.learn({.feed_ratio = feed_ratio(feed),
               .gain_n = seen.gain_n,
               .jumped = seen.jumped,
@@ -169,11 +178,11 @@ void Predictive::learn(const GainTracker::Output& seen, float feed, CutPhase pha
 // A gain that was higher is forgotten slowly, faster once rising is allowed again. (C85)
 void Predictive::fear(const GainTracker::Output& seen, float gain_n, bool rise,
                       CutPhase phase) noexcept {
-  State& s = state_;
+  Own& s = own_;
   s.recovering_s =
       seen.jumped || !rise ? 0.0F : std::min(s.recovering_s + config_.period_s, 100.0F);
-  const float rate = s.recovering_s < kAfterJump_s ? kAfterJump_1_s : config_.recovery_1_s;
-  const float kept = rise ? s.feared_n * exp_bounded(-rate * config_.period_s) : s.feared_n;
+  const float left = s.recovering_s < kAfterJump_s ? forgets_after_jump_ratio_ : forgets_ratio_;
+  const float kept = rise ? s.feared_n * left : s.feared_n;
   s.feared_n = phase == CutPhase::kAir && !seen.resolving ? 0.0F : std::max(gain_n, kept);
 }
 
@@ -188,12 +197,12 @@ float Predictive::within_map(float wanted_pct, const Forecast& ahead, const Inpu
 }
 
 auto Predictive::step(const Input& input) noexcept -> Output {
-  State& s = state_;
+  Own& s = own_;
   if (input.part_start) {
     tracker_.restart();
     map_.start();
   }
-  const float speed = input.spindle_ratio > 0.0F
+  const float speed = input.spindle_ratio > 0.0F && input.spindle_ratio != 1.0F
                           ? power_positive(input.spindle_ratio, -config_.feed_exponent)
                           : 1.0F;
   const KnownFeed feed = known_feed(input.override_applied_pct);
@@ -242,21 +251,17 @@ auto Predictive::step(const Input& input) noexcept -> Output {
 void Predictive::rejoin() noexcept {
   tracker_.restart();
   map_.lose_place();
-  state_ = State{};
-  state_.sent.fill(1.0F);
-  state_.feed.v = 1.0F;
+  own_ = Own{};
+  own_.sent.fill(1.0F);
+  own_.feed.v = 1.0F;
 }
 
 auto Predictive::state() const noexcept -> State {
-  State s = state_;
-  s.tracker = tracker_.state();
-  s.map = map_.state();
-  s.bank = bank_.state();
-  return s;
+  return {.tracker = tracker_.state(), .map = map_.state(), .bank = bank_.state(), .own = own_};
 }
 
 void Predictive::restore(const State& state) noexcept {
-  state_ = state;
+  own_ = state.own;
   tracker_.restore(state.tracker);
   map_.restore(state.map);
   bank_.restore(state.bank);

@@ -27,7 +27,7 @@ namespace cutforce::control {
 class Predictive {
  public:
   static constexpr bool kForesees = true;
-  static constexpr std::size_t kHistory = 24;  // ticks of dead time at the most
+  static constexpr std::uint32_t kHistory = 24;  // ticks of dead time at the most
 
   enum class ConfigError : std::uint8_t {
     kPeriod,
@@ -70,14 +70,15 @@ class Predictive {
   using Input = LawInput;
   using Output = LawOutput;
 
-  struct State {
-    GainTracker::State tracker{};
-    PathMap::State map{};
-    LatencyBank::State bank{};
+  // What the law itself keeps, beside its parts.
+  struct Own {
     FeedState feed{};
-    std::array<float, kHistory> sent{};  // (u/u0)^p, newest first
-    float sent_pct = 100.0F;             // u of sent[0]
-    float feared_n = 0.0F;               // pessimistic gain K_c
+    // (u/u0)^p of the last ticks, newest first from `newest` on. Each is written twice, kHistory
+    // apart, so that they lie in a row wherever the row begins and nothing has to be moved.
+    std::array<float, 2 * kHistory> sent{};
+    std::uint32_t newest = 0;
+    float sent_pct = 100.0F;  // u of the newest
+    float feared_n = 0.0F;    // pessimistic gain K_c
     float since_jump_s = 100.0F;
     float recovering_s = 100.0F;  // since the override may rise again
     float before_jump_n = 0.0F;   // gain before a jump down, while the cut may be lost; else 0
@@ -87,6 +88,13 @@ class Predictive {
     float held_s = 0.0F;     // the present code has been sent for
     float trend_1_s = 0.0F;  // relative slope of the gain
     float last_gain_n = 0.0F;
+  };
+
+  struct State {
+    GainTracker::State tracker{};
+    PathMap::State map{};
+    LatencyBank::State bank{};
+    Own own{};
   };
 
   // Fails iff check() does.
@@ -122,7 +130,7 @@ class Predictive {
     float sigma;
   };
   [[nodiscard]] KnownFeed known_feed(float applied_pct) noexcept;
-  [[nodiscard]] Forecast forecast(float force_n, float drive_n) const noexcept;
+  [[nodiscard]] Forecast forecast(float force_n, float drive_n) noexcept;
   [[nodiscard]] float pessimistic_gain_n(const GainTracker::Output& seen) noexcept;
   [[nodiscard]] Reach reach(const Forecast& ahead, float reference_n) const noexcept;
   [[nodiscard]] float stable_gain_ratio(const Horizon& horizon) const noexcept;
@@ -132,7 +140,8 @@ class Predictive {
   void doubt_timing(const GainTracker::Output& seen) noexcept;
   void assume_latency(float latency_s) noexcept;
   void find_latency(const Input& input, bool jumped) noexcept;
-  [[nodiscard]] float feed_ratio(float w) const noexcept;
+  [[nodiscard]] float feed_ratio(float w) noexcept;
+  [[nodiscard]] const float* sent() const noexcept { return &own_.sent[own_.newest]; }
   void fear(const GainTracker::Output& seen, float gain_n, bool rise, CutPhase phase) noexcept;
   [[nodiscard]] float within_map(float wanted_pct, const Forecast& ahead,
                                  const Input& input) noexcept;
@@ -148,7 +157,13 @@ class Predictive {
   float dead_decay_;             // of the cut over the dead time
   LagStep tick_, early_, late_;  // early_: the part of a tick before a byte arrives
   std::array<Horizon, kReaches> horizons_;
-  State state_{};
+  float inverse_exponent_;          // 1/p
+  float forgets_ratio_;             // what is left of a feared gain after a tick,
+  float forgets_after_jump_ratio_;  // and soon after a jump
+  // The last answer of feed_ratio(): at a resting override w comes to rest too.
+  float asked_w_ = 1.0F;
+  float answered_ratio_ = 1.0F;
+  Own own_{};
 };
 
 }  // namespace cutforce::control

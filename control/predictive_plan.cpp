@@ -30,22 +30,22 @@ constexpr float kLost_s = 0.5F;           // after which a cut that is left is a
 }  // namespace
 
 // To the end of the dead time, with the codes that are on their way. (C86)
-auto Predictive::forecast(float force_n, float drive_n) const noexcept -> Forecast {
-  FeedState feed = state_.feed;
+auto Predictive::forecast(float force_n, float drive_n) noexcept -> Forecast {
+  FeedState feed = own_.feed;
   float path_s = 0.0F;
   const auto go = [&](const LagStep& step, float w) {
     const float mean = feed.advance(step, config_.feed_lag_s, w);
-    path_s += step.length_s * feed_ratio(mean);
+    if (map_.limits()) path_s += step.length_s * feed_ratio(mean);  // nobody else asks
     force_n = step.cut * force_n + (1.0F - step.cut) * drive_n * mean;
   };
-  if (early_.length_s > 0.0F) go(early_, state_.sent[whole_ticks_]);
-  for (std::size_t k = whole_ticks_; k > 0; --k) go(tick_, state_.sent[k - 1]);
+  if (early_.length_s > 0.0F) go(early_, sent()[whole_ticks_]);
+  for (std::size_t k = whole_ticks_; k > 0; --k) go(tick_, sent()[k - 1]);
   return {.force_n = force_n, .feed = feed.v, .path_s = path_s, .drive_n = drive_n};
 }
 
 // (C84), (C85)
 float Predictive::pessimistic_gain_n(const GainTracker::Output& seen) noexcept {
-  State& s = state_;
+  Own& s = own_;
   const float period_s = config_.period_s;
   if (!(seen.gain_n > 0.0F)) {
     s.last_gain_n = 0.0F;
@@ -68,7 +68,7 @@ float Predictive::pessimistic_gain_n(const GainTracker::Output& seen) noexcept {
 
 // (C87)
 auto Predictive::reach(const Forecast& ahead, float reference_n) const noexcept -> Reach {
-  const bool recent = state_.since_jump_s < kDeepRetreat_s;
+  const bool recent = own_.since_jump_s < kDeepRetreat_s;
   if (ahead.force_n > kAbove_ratio * reference_n) {
     return recent || ahead.force_n > kFarAbove_ratio * reference_n ? kOneTick : kMiddle;
   }
@@ -86,7 +86,7 @@ float Predictive::stable_gain_ratio(const Horizon& horizon) const noexcept {
 auto Predictive::with_margin(Reach reach, const GainTracker::Output& seen) const noexcept -> Reach {
   const float highest_n = seen.gain_n + kConfidence * seen.gain_sigma_n;
   while (reach != kCalm &&
-         stable_gain_ratio(horizons_[reach]) * state_.feared_n < kMarginLeast * highest_n) {
+         stable_gain_ratio(horizons_[reach]) * own_.feared_n < kMarginLeast * highest_n) {
     reach = static_cast<Reach>(reach + 1);
   }
   return reach;
@@ -100,13 +100,13 @@ float Predictive::wanted_pct(const Forecast& ahead, const Horizon& horizon,
   const float w =
       (reference_n - horizon.force * ahead.force_n - ahead.drive_n * horizon.feed * ahead.feed) /
       (ahead.drive_n * own);
-  const float over = state_.since_jump_s < kLost_s ? kOverAfterJump_ratio : kOver_ratio;
+  const float over = own_.since_jump_s < kLost_s ? kOverAfterJump_ratio : kOver_ratio;
   const float most = over * reference_n / ahead.drive_n;
   const float limited = std::min(w, most);
   if (!(limited > 1e-4F)) return config_.floor_pct;
   if (limited > 1e4F) return config_.ceiling_pct;
-  return std::clamp(100.0F * power_positive(limited, 1.0F / config_.feed_exponent),
-                    config_.floor_pct, config_.ceiling_pct);
+  return std::clamp(100.0F * power_positive(limited, inverse_exponent_), config_.floor_pct,
+                    config_.ceiling_pct);
 }
 
 // A code that the CNC has, and not a new one for nothing. (C90)
@@ -121,16 +121,16 @@ float Predictive::as_code(float wanted_pct, float sent_pct) const noexcept {
     }
     return std::max(down(wanted_pct), config_.floor_pct);
   }
-  const float fade = exp_bounded(-state_.held_s / kKeepFade_s);
-  const float keep = std::max(0.6F * step, kKeep_ratio * wanted_pct * fade);
-  const float apart = wanted_pct - sent_pct;
-  if (apart <= keep && apart >= -keep) return sent_pct;
+  const float apart = estimator::magnitude(wanted_pct - sent_pct);
+  if (apart <= 0.6F * step) return sent_pct;
+  const float most = kKeep_ratio * wanted_pct;  // before it fades
+  if (apart <= most && apart <= most * exp_bounded(-own_.held_s / kKeepFade_s)) return sent_pct;
   return down(wanted_pct + 0.5F * step);
 }
 
 // Not with a jump upwards, and not while the tool may be broken. (C91)
 bool Predictive::may_rise(const GainTracker::Output& seen, CutPhase phase) noexcept {
-  State& s = state_;
+  Own& s = own_;
   if (phase == CutPhase::kAir && !seen.resolving) {
     s.before_jump_n = 0.0F;
     return true;

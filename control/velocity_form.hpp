@@ -24,11 +24,16 @@ struct VelocityGains {
 inline constexpr float kFarPct = 1e4F;  // far beyond every limit, and finite
 inline constexpr float kFarN = 1e9F;    // and far beyond every force
 
+// std::clamp(x, -most, most), told by one comparison where there is nothing to do.
+[[nodiscard]] constexpr float within(float x, float most) noexcept {
+  return __builtin_fabsf(x) <= most ? x : std::clamp(x, -most, most);
+}
+
 // The law's answer to one tick. `State` keeps wanted_pct, U(i-1), and error_n, E(i-1).
 template <class State>
 [[nodiscard]] constexpr float velocity_form_pct(State& state, const LawInput& input,
                                                 const VelocityGains& gains) noexcept {
-  const float error_n = std::clamp(input.force_reference_n - input.force_n, -kFarN, kFarN);  // (C1)
+  const float error_n = within(input.force_reference_n - input.force_n, kFarN);  // (C1)
   const float base_pct =
       std::clamp(state.wanted_pct, input.override_applied_pct - input.override_tolerance_pct,
                  input.override_applied_pct + input.override_tolerance_pct);  // (C2)
@@ -39,7 +44,7 @@ template <class State>
           state.wanted_pct + gains.tracking_ratio * (base_pct - state.wanted_pct);
       const float wanted_pct = before_pct + gains.proportional_pct_n * (error_n - state.error_n) +
                                gains.integral_pct_n * error_n;
-      state.wanted_pct = std::clamp(wanted_pct, -kFarPct, kFarPct);
+      state.wanted_pct = within(wanted_pct, kFarPct);
       state.error_n = error_n;
       return state.wanted_pct;
     }

@@ -11,6 +11,7 @@
 // The two-wattmeter form is this dot product written in measured quantities; see EQUATIONS.md.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <expected>
 #include <optional>
@@ -69,10 +70,11 @@ class AirGapPower {
   };
 
   struct State {
-    std::uint32_t sample = 0;   // of the window, 0: the next sample starts one
-    std::uint32_t started = 0;  // 0: there is no sample before the next one
-    float skip_samples = 0.0F;  // left out at the start of the window
-    float weight = 0.0F;        // sums over the window so far
+    std::uint32_t sample = 0;      // of the window, 0: the next sample starts one
+    std::uint32_t started = 0;     // 0: there is no sample before the next one
+    float skip_samples = 0.0F;     // left out at the start of the window
+    std::uint32_t whole_from = 0;  // samples from here on count in full
+    float weight = 0.0F;           // sums over the window so far
     float airgap_w = 0.0F;
     float current_square_a2 = 0.0F;
     float difference_square_w2 = 0.0F;
@@ -88,7 +90,14 @@ class AirGapPower {
   }
 
   // One raw sample; an output with the last sample of each window.
-  [[nodiscard]] std::optional<Output> step(const Input& input) noexcept;
+  [[nodiscard]] std::optional<Output> step(const Input& input) noexcept {
+    if (!add(input.sample, input.electrical_rad_s)) return std::nullopt;
+    return close_window();
+  }
+  // The same in two parts: true with the last sample of a window, which close_window() then ends.
+  [[nodiscard]] [[gnu::always_inline]] bool add(const MotorSample& sample,
+                                                float electrical_rad_s) noexcept;
+  [[nodiscard]] Output close_window() noexcept;
 
   // Drops the window so far. For gaps in the signals.
   constexpr void restart() noexcept { state_ = {}; }
@@ -101,12 +110,54 @@ class AirGapPower {
       : config_(config), loss_ohm_(1.5F * config.stator_resistance_ohm) {}
 
   [[nodiscard]] float skipped_samples(float electrical_rad_s) const noexcept;
-  [[nodiscard]] Output close_window() noexcept;
 
   Config config_;
   float loss_ohm_;
   State state_{};
 };
+
+inline bool AirGapPower::add(const MotorSample& sample, float electrical_rad_s) noexcept {
+  const float square = dot(sample.current_a, sample.current_a);
+  const float copper = loss_ohm_ * square;  // (E22)
+  const float in = config_.mode == Mode::kDotProduct
+                       ? input_power(sample)  // (E21)
+                       : 1.5F * config_.power_factor_ratio *
+                             std::sqrt(square * dot(sample.voltage_v, sample.voltage_v));  // (E23)
+  const float airgap = in - copper;
+
+  if (state_.sample == 0) [[unlikely]] {
+    state_.skip_samples = skipped_samples(electrical_rad_s);
+    state_.whole_from = static_cast<std::uint32_t>(state_.skip_samples) + 2;
+    if (state_.started == 0) {
+      state_.started = 1;
+      state_.last_airgap_w = airgap;
+      state_.last_square_a2 = square;
+    }
+  }
+  ++state_.sample;
+
+  // Trapezoid between two samples, so that the mean belongs to the span between two readings of
+  // the speed, (E24).
+  const float difference = airgap - state_.last_airgap_w;
+  float power = 0.5F * (airgap + state_.last_airgap_w);
+  float current = 0.5F * (square + state_.last_square_a2);
+  float scatter = difference * difference;
+  float weight = 1.0F;
+  if (state_.sample < state_.whole_from) {
+    const float share = static_cast<float>(state_.sample) - state_.skip_samples;
+    weight = share > 0.0F ? (share < 1.0F ? share : 1.0F) : 0.0F;
+    power *= weight;
+    current *= weight;
+    scatter = weight * difference * difference;
+  }
+  state_.weight += weight;
+  state_.airgap_w += power;
+  state_.current_square_a2 += current;
+  state_.difference_square_w2 += scatter;
+  state_.last_airgap_w = airgap;
+  state_.last_square_a2 = square;
+  return state_.sample >= config_.samples_per_window;
+}
 
 static_assert(std::is_trivially_copyable_v<AirGapPower>);
 static_assert(std::is_trivially_copyable_v<AirGapPower::State>);

@@ -43,48 +43,27 @@ void FluxTorque::set_frequency(float frequency_rad_s) noexcept {
   state_.frequency_rad_s = frequency_rad_s;
 }
 
-void FluxTorque::step(const MotorSample& sample, float elapsed_periods) noexcept {
-  const SpaceVector v = sample.voltage_v;
-  const SpaceVector i = sample.current_a;
-  const SpaceVector e{v.alpha - config_.stator_resistance_ohm * i.alpha,
-                      v.beta - config_.stator_resistance_ohm * i.beta};  // (E60)
-  float a = state_.leak;
-  SpaceVector c = state_.gain_s;
+void FluxTorque::step_apart(const MotorSample& sample, float elapsed_periods) noexcept {
+  const SpaceVector e = emf(sample.voltage_v, sample.current_a);
+  Coefficients used{.leak = state_.leak, .gain_s = state_.gain_s};
   bool resolved = true;
   if (elapsed_periods != 1.0F) {
     const float period_s = elapsed_periods * config_.sample_period_s;
     const float half_angle = 0.5F * state_.frequency_rad_s * period_s;
     resolved = half_angle < kLargestHalfAngle_rad && half_angle > -kLargestHalfAngle_rad;
-    if (resolved) {
-      const auto fresh = coefficients(state_.frequency_rad_s, period_s);
-      a = fresh.leak;
-      c = fresh.gain_s;
-    }
+    if (resolved) used = coefficients(state_.frequency_rad_s, period_s);
   }
   if (state_.samples == 0) {
     state_.emf_v = e;
     state_.samples = 1;
   }
   if (resolved) {
-    const SpaceVector sum{e.alpha + state_.emf_v.alpha, e.beta + state_.emf_v.beta};
-    const SpaceVector grown = times(c, sum);
-    state_.flux_v_s = {a * state_.flux_v_s.alpha + grown.alpha,
-                       a * state_.flux_v_s.beta + grown.beta};  // (E61)
+    integrate(e, used.leak, used.gain_s);
   } else {
     state_.emf_v = e;
     seed();
   }
-  const float torque = 1.5F * config_.pole_pairs * cross(i, state_.flux_v_s);  // (E62)
-
-  const float trapezoid = (torque + state_.torque_nm) * elapsed_periods;
-  state_.torque_sum_nm += trapezoid;
-  state_.moment_sum_nm += trapezoid * state_.elapsed_periods;
-  state_.power_sum_w += dot(v, i) * elapsed_periods;
-  state_.current_sum_a2 += dot(i, i) * elapsed_periods;
-  state_.elapsed_periods += elapsed_periods;
-  state_.torque_nm = torque;
-  state_.emf_v = e;
-  state_.current_a = i;
+  add(sample, e, elapsed_periods);
 }
 
 void FluxTorque::seed() noexcept {
@@ -118,8 +97,7 @@ auto FluxTorque::take() noexcept -> Window {
 }
 
 void FluxTorque::remove_offset(SpaceVector voltage_v, SpaceVector current_a) noexcept {
-  const SpaceVector e{voltage_v.alpha - config_.stator_resistance_ohm * current_a.alpha,
-                      voltage_v.beta - config_.stator_resistance_ohm * current_a.beta};
+  const SpaceVector e = emf(voltage_v, current_a);
   state_.emf_v = {state_.emf_v.alpha - e.alpha, state_.emf_v.beta - e.beta};
   state_.current_a = {state_.current_a.alpha - current_a.alpha,
                       state_.current_a.beta - current_a.beta};

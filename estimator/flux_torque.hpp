@@ -74,7 +74,15 @@ class FluxTorque {
   [[nodiscard]] static std::expected<FluxTorque, ConfigError> make(const Config& config) noexcept;
 
   // elapsed_periods: time since the last sample in nominal sample periods; exactly 1 normally.
-  void step(const MotorSample& sample, float elapsed_periods) noexcept;
+  [[gnu::always_inline]] void step(const MotorSample& sample, float elapsed_periods) noexcept {
+    if (elapsed_periods != 1.0F || state_.samples == 0) [[unlikely]] {
+      step_apart(sample, elapsed_periods);
+      return;
+    }
+    const SpaceVector e = emf(sample.voltage_v, sample.current_a);
+    integrate(e, state_.leak, state_.gain_s);
+    add(sample, e, 1.0F);
+  }
 
   // Closes the window. Duration 0 (no sample since the last call) gives the last torque.
   [[nodiscard]] Window take() noexcept;
@@ -93,14 +101,44 @@ class FluxTorque {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit FluxTorque(const Config& config) noexcept : config_(config) {}
+  explicit FluxTorque(const Config& config) noexcept
+      : config_(config), torque_scale_(1.5F * config.pole_pairs) {}
   struct Coefficients {
     float leak;
     SpaceVector gain_s;
   };
   [[nodiscard]] Coefficients coefficients(float frequency_rad_s, float period_s) const noexcept;
 
+  [[nodiscard]] SpaceVector emf(SpaceVector v, SpaceVector i) const noexcept {  // (E60)
+    return {v.alpha - config_.stator_resistance_ohm * i.alpha,
+            v.beta - config_.stator_resistance_ohm * i.beta};
+  }
+  void integrate(SpaceVector e, float a, SpaceVector c) noexcept {  // (E61)
+    const SpaceVector sum{e.alpha + state_.emf_v.alpha, e.beta + state_.emf_v.beta};
+    const SpaceVector grown{c.alpha * sum.alpha - c.beta * sum.beta,
+                            c.alpha * sum.beta + c.beta * sum.alpha};
+    state_.flux_v_s = {a * state_.flux_v_s.alpha + grown.alpha,
+                       a * state_.flux_v_s.beta + grown.beta};
+  }
+  void add(const MotorSample& sample, SpaceVector e, float elapsed_periods) noexcept {
+    const SpaceVector v = sample.voltage_v;
+    const SpaceVector i = sample.current_a;
+    const float torque = torque_scale_ * cross(i, state_.flux_v_s);  // (E62)
+    const float trapezoid = (torque + state_.torque_nm) * elapsed_periods;
+    state_.torque_sum_nm += trapezoid;
+    state_.moment_sum_nm += trapezoid * state_.elapsed_periods;
+    state_.power_sum_w += dot(v, i) * elapsed_periods;
+    state_.current_sum_a2 += dot(i, i) * elapsed_periods;
+    state_.elapsed_periods += elapsed_periods;
+    state_.torque_nm = torque;
+    state_.emf_v = e;
+    state_.current_a = i;
+  }
+  // The first sample of all, or one that does not follow the last by one period.
+  void step_apart(const MotorSample& sample, float elapsed_periods) noexcept;
+
   Config config_;
+  float torque_scale_;
   State state_{};
 };
 

@@ -66,6 +66,7 @@ auto FrontEnd::set_calibration(const Calibration& calibration) noexcept
 void FrontEnd::restore(const State& state) noexcept {
   state_ = state;
   fold();
+  find_lead();
 }
 
 void FrontEnd::fold() noexcept {  // (E5)

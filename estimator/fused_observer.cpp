@@ -24,8 +24,8 @@ constexpr float kTareFollow_ratio = 0.02F;  // of what the tare belongs to, each
 }  // namespace
 
 FusedObserver::FusedObserver(const Config& config) noexcept
-    : config_(config),
-      flux_(*FluxTorque::make(config.flux)),
+    : flux_(*FluxTorque::make(config.flux)),
+      config_(config),
       filter_(*LoadTorqueFilter::make(config.filter)),
       air_(*AirCut::make(config.air)),
       noise_({.sample_period_s = config.flux.sample_period_s,
@@ -65,18 +65,6 @@ void FusedObserver::restore(const State& state) noexcept {
   resistance_.restore(state.resistance);
   meter_.restore(state.meter);
   tick_ = state.tick;
-}
-
-void FusedObserver::step(const Sample& sample) noexcept {
-  flux_.step(sample.motor, sample.elapsed_periods);
-  if (sample.speed_valid) {
-    tick_.speed_sum_rad_s += sample.speed_rad_s;
-    ++tick_.speed_count;
-  }
-  if (sample.meter_valid) {
-    tick_.meter_w = sample.power_meter_w;
-    ++tick_.meter_count;
-  }
 }
 
 void FusedObserver::recalibrated(SpaceVector voltage_offset_v,
@@ -181,8 +169,8 @@ void FusedObserver::learn(const FluxTorque::Window& window, const Rotation& r, c
     tick_.idle_copper += share * (copper - tick_.idle_copper);
     tick_.idle_power_torque_nm += share * (power - tick_.idle_power_torque_nm);
   }
-  if (tick_.meter_count > 0) meter_.step(window.power_w, tick_.meter_w, out.duration_s);
-  tick_.meter_count = 0;
+  if (tick_.has_meter != 0) meter_.step(window.power_w, tick_.meter_w, out.duration_s);
+  tick_.has_meter = 0;
   if (!config_.track_resistance || config_.sensorless) return;
   // |psi_R|^2 with the resistance found so far: psi less dR i / (j w_e).
   const float k = resistance_.change_ohm() / tick_.frequency_rad_s;
@@ -217,19 +205,22 @@ auto FusedObserver::delayed(float torque_nm, float moment_nm) noexcept -> std::a
 
 auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
   const FluxTorque::Window window = flux_.take();
-  Output out{};
-  out.duration_s = window.duration_s;
-  if (!(window.duration_s > 0.0F)) return out;
+  if (!(window.duration_s > 0.0F)) return Output{};
   const float h = window.duration_s;
   const Rotation r = rotation(window);
   track_frequency(r, h);
   const bool locked = tick_.locked_s > kLock_s;
   const Speed speed = take_speed(r, window.torque_nm, locked, h);
-  out.frequency_rad_s = tick_.frequency_rad_s;
-  out.airgap_torque_nm = window.torque_nm;
-  out.airgap_power_w =
+  const float airgap_power_w =
       window.power_w - 1.5F * config_.flux.stator_resistance_ohm * window.current_squared_a2;
-  if (!locked || (!speed.valid && tick_.ticks == 0)) return unlocked(speed.mean_rad_s, feed, out);
+  if (!locked || (!speed.valid && tick_.ticks == 0)) {
+    Output out{};
+    out.duration_s = h;
+    out.frequency_rad_s = tick_.frequency_rad_s;
+    out.airgap_torque_nm = window.torque_nm;
+    out.airgap_power_w = airgap_power_w;
+    return unlocked(speed.mean_rad_s, feed, out);
+  }
 
   const float p = config_.flux.pole_pairs;
   const float copper = 1.5F * window.current_squared_a2 * p / tick_.frequency_rad_s;
@@ -295,7 +286,6 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .tare_nm = load.speed_rad_s < 0.0F ? -air.tare_nm : air.tare_nm,
                  .calibrated = tick_.calibrated != 0});
 
-  out.valid = true;
   if (air.steady) {
     tick_.even_angle_rad += r.current_rad_s * h;
     tick_.even_s += h;
@@ -303,20 +293,23 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
     tick_.even_angle_rad = tick_.even_s = 0.0F;
   }
   // Channel offsets ripple the angle once a turn of the field: only the mean of turns counts.
-  if (magnitude(tick_.even_angle_rad) > kEvenTurns * kTwoPi) {
-    out.even_frequency_rad_s = tick_.even_angle_rad / tick_.even_s;
-  }
-  out.calibrated = tick_.calibrated != 0;
-  out.tared = air.has_tare;
-  out.phase = air.phase;
-  out.airgap_torque_nm = torque;
-  out.load_torque_nm = load.load_torque_nm;
-  out.net_torque_nm = air.net_torque_nm;
-  out.net_sigma_nm = sigma_nm(load, air, torque, copper, change);
-  out.speed_rad_s = load.speed_rad_s;
-  out.tare_nm = air.tare_nm;
-  out.tare_age_s = air.tare_age_s;
-  out.idle_s = air.idle_s;
+  const bool even_turns = magnitude(tick_.even_angle_rad) > kEvenTurns * kTwoPi;
+  const Output out{.valid = true,
+                   .calibrated = tick_.calibrated != 0,
+                   .tared = air.has_tare,
+                   .phase = air.phase,
+                   .airgap_power_w = airgap_power_w,
+                   .airgap_torque_nm = torque,
+                   .load_torque_nm = load.load_torque_nm,
+                   .net_torque_nm = air.net_torque_nm,
+                   .net_sigma_nm = sigma_nm(load, air, torque, copper, change),
+                   .speed_rad_s = load.speed_rad_s,
+                   .frequency_rad_s = tick_.frequency_rad_s,
+                   .even_frequency_rad_s = even_turns ? tick_.even_angle_rad / tick_.even_s : 0.0F,
+                   .tare_nm = air.tare_nm,
+                   .tare_age_s = air.tare_age_s,
+                   .idle_s = air.idle_s,
+                   .duration_s = h};
   learn(window, r, out, copper, speed.mean_rad_s);
   return out;
 }

@@ -115,8 +115,8 @@ class FusedObserver {
     float speed_sum_rad_s = 0.0F;
     std::uint32_t speed_count = 0;
     float meter_w = 0.0F;
-    std::uint32_t meter_count = 0;
-    float ripple_rad_s = 0.0F;  // taken off the speed of this tick
+    std::uint32_t has_meter = 0;  // in this tick
+    float ripple_rad_s = 0.0F;    // taken off the speed of this tick
     float load_torque_nm = 0.0F;
     float moved_nm = 0.0F;              // largest recent change of a tick, fading
     float consistency_ratio = 1.0F;     // of the innovations, averaged
@@ -142,7 +142,26 @@ class FusedObserver {
   [[nodiscard]] static std::expected<FusedObserver, ConfigError> make(
       const Config& config) noexcept;
 
-  void step(const Sample& sample) noexcept;
+  void step(const Sample& sample) noexcept {
+    step(sample.motor, sample.elapsed_periods);
+    if (sample.speed_valid) note_speed(sample.speed_rad_s);
+    if (sample.meter_valid) note_meter(sample.power_meter_w);
+  }
+  // The same in its parts.
+  [[gnu::always_inline]] void step(const MotorSample& motor, float elapsed_periods) noexcept {
+    flux_.step(motor, elapsed_periods);
+  }
+  void note_speed(float speed_rad_s) noexcept {
+    tick_.speed_sum_rad_s += speed_rad_s;
+    ++tick_.speed_count;
+  }
+  void note_meter(float power_w) noexcept {
+    tick_.meter_w = power_w;
+    tick_.has_meter = 1;
+  }
+  // Of the speeds since the last tick.
+  [[nodiscard]] float speed_sum_rad_s() const noexcept { return tick_.speed_sum_rad_s; }
+  [[nodiscard]] std::uint32_t speed_count() const noexcept { return tick_.speed_count; }
   [[nodiscard]] Output tick(AirCut::Feed feed) noexcept;
 
   // Samples are missing: what was learned stays, what was integrated begins anew.
@@ -180,8 +199,9 @@ class FusedObserver {
                                float torque_nm, float copper, float change_nm) noexcept;
   [[nodiscard]] Output unlocked(float speed_rad_s, AirCut::Feed feed, Output out) noexcept;
 
+  FluxTorque flux_;  // these two first: every sample needs them
+  Tick tick_{};
   Config config_;
-  FluxTorque flux_;
   LoadTorqueFilter filter_;
   AirCut air_;
   NoiseMeter noise_;
@@ -189,7 +209,8 @@ class FusedObserver {
   RunUpInertia inertia_;
   StatorResistance resistance_;
   PowerScale meter_;
-  Tick tick_{};
+  float share_of_s_ = 0.0F;  // length of the tick that share_, of (E101), belongs to
+  float share_ = 0.0F;
 };
 
 static_assert(std::is_trivially_copyable_v<FusedObserver>);

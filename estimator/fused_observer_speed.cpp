@@ -44,7 +44,11 @@ void FusedObserver::track_frequency(const Rotation& r, float duration_s) noexcep
                            magnitude(r.flux_rad_s - w) < 0.3F * size + 20.0F &&
                            magnitude(r.current_rad_s - w) < 0.5F * size + 60.0F;
   const float seen = flux_agrees ? r.flux_rad_s : r.current_rad_s;
-  const float share = 1.0F - exp_bounded(-duration_s / kFrequencyTime_s);
+  if (duration_s != share_of_s_) {  // ticks are nearly always of one length
+    share_of_s_ = duration_s;
+    share_ = 1.0F - exp_bounded(-duration_s / kFrequencyTime_s);
+  }
+  const float share = share_;
   const float off = seen - w - tick_.acceleration_rad_s2 * duration_s;
   tick_.frequency_rad_s = seen - (1.0F - share) * off;  // (E101)
   tick_.acceleration_rad_s2 += 0.25F * share * share * off / duration_s;

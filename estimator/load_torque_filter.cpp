@@ -1,5 +1,7 @@
 #include "estimator/load_torque_filter.hpp"
 
+#include <cmath>
+
 #include "estimator/polynomials.hpp"
 
 namespace cutforce::estimator {
@@ -15,31 +17,65 @@ struct Innovation {
   float variance;
 };
 
-void predict(LoadTorqueFilter::Model& m, const LoadTorqueFilter::Input& in,
-             const LoadTorqueFilter::Noise& noise, float g, float q2) noexcept {
+// What both models share in a tick.
+struct Shared {
+  float g;
+  float c;           // k g
+  float into_speed;  // what the torque's noise adds to the variances: g^2 R_T,
+  float into_both;   // k g^2 R_T
+  float into_angle;  // k (2 - k) g^2 R_T
+  float torque_nm;
+  float moment_nm;
+  float speed_rad_s;
+  float centre_ratio;
+  float speed_variance;
+  float angle_variance;
+  bool speed_valid;
+
+  Shared(const LoadTorqueFilter::Input& in, const LoadTorqueFilter::Noise& noise) noexcept
+      : g(in.duration_s / in.inertia_kg_m2),
+        c(noise.centre_ratio * g),
+        into_speed(g * g * noise.torque_variance),
+        into_both(c * g * noise.torque_variance),
+        into_angle(noise.centre_ratio * (2.0F - noise.centre_ratio) * g * g *
+                   noise.torque_variance),
+        torque_nm(in.torque_nm),
+        moment_nm(in.moment_nm),
+        // No measurement: alpha restarts at 0 with the tick, as if the prediction had been
+        // measured.
+        speed_rad_s(in.speed_valid ? in.speed_rad_s : 0.0F),
+        centre_ratio(noise.centre_ratio),
+        speed_variance(noise.speed_variance),
+        angle_variance(noise.angle_variance),
+        speed_valid(in.speed_valid) {}
+};
+
+// Both are inlined twice, on copies that live in registers: 400 instructions a tick for 530.
+[[gnu::always_inline]] inline void predict(LoadTorqueFilter::Model& m, const Shared& in,
+                                           float q2) noexcept {
   auto& [aa, aw, at, ww, wt, tt] = m.covariance;
   tt += q2;  // (E70)
   // w+ = w - g tau+, (E71)
-  const float ww1 = ww - g * (2.0F * wt - g * tt) + g * g * noise.torque_variance;
-  const float wt1 = wt - g * tt;
-  const float aw1 = aw - g * at;
+  const float ww1 = ww - in.g * (2.0F * wt - in.g * tt) + in.into_speed;
+  const float wt1 = wt - in.g * tt;
+  const float aw1 = aw - in.g * at;
   // alpha+ = alpha + w+ + c tau+, (E72); torque noise enters w+ and leaves by -k.
-  const float c = noise.centre_ratio * g;
-  const float aw2 = aw1 + ww1 + c * wt1 - noise.centre_ratio * g * g * noise.torque_variance;
-  const float at2 = at + wt1 + c * tt;
-  aa += 2.0F * (aw1 + c * at) + ww1 + c * (2.0F * wt1 + c * tt) + noise.speed_variance -
-        noise.centre_ratio * (2.0F - noise.centre_ratio) * g * g * noise.torque_variance;
+  const float aw2 = aw1 + ww1 + in.c * wt1 - in.into_both;
+  const float at2 = at + wt1 + in.c * tt;
+  aa += 2.0F * (aw1 + in.c * at) + ww1 + in.c * (2.0F * wt1 + in.c * tt) + in.speed_variance -
+        in.into_angle;
   aw = aw2;
   at = at2;
   ww = ww1;
   wt = wt1;
 
-  const float acceleration = g * (in.torque_nm - m.mean[2]);
+  const float acceleration = in.g * (in.torque_nm - m.mean[2]);
   m.mean[1] += acceleration;
-  m.mean[0] += m.mean[1] - g * (in.moment_nm - noise.centre_ratio * m.mean[2]) - in.speed_rad_s;
+  m.mean[0] += m.mean[1] - in.g * (in.moment_nm - in.centre_ratio * m.mean[2]) - in.speed_rad_s;
 }
 
-Innovation correct(LoadTorqueFilter::Model& m, float angle_variance) noexcept {
+[[gnu::always_inline]] inline Innovation correct(LoadTorqueFilter::Model& m,
+                                                 float angle_variance) noexcept {
   auto& [aa, aw, at, ww, wt, tt] = m.covariance;
   const float s = aa + angle_variance;
   const float r = -m.mean[0];
@@ -60,6 +96,26 @@ Innovation correct(LoadTorqueFilter::Model& m, float angle_variance) noexcept {
   if (!(ww > 0.0F)) ww = 0.0F;
   if (!(tt > 0.0F)) tt = 0.0F;
   return {.value = r, .variance = s};
+}
+
+// One model through the tick: mixed, predicted, corrected.
+[[gnu::always_inline]] inline Innovation advance(LoadTorqueFilter::Model& model,
+                                                 const std::array<float, 3>& from,
+                                                 const std::array<float, 3>& apart, float share,
+                                                 const Shared& in, float q2) noexcept {
+  LoadTorqueFilter::Model m{
+      .mean = {from[0] + share * apart[0], from[1] + share * apart[1], from[2] + share * apart[2]},
+      .covariance = model.covariance};
+  predict(m, in, q2);
+  Innovation innovation{};
+  if (in.speed_valid) {
+    innovation = correct(m, in.angle_variance);
+  } else {
+    m.mean[0] = 0.0F;
+    m.covariance[0] = m.covariance[1] = m.covariance[2] = 0.0F;
+  }
+  model = m;
+  return innovation;
 }
 
 }  // namespace
@@ -89,7 +145,8 @@ void LoadTorqueFilter::loosen(float torque_sigma_nm) noexcept {
 auto LoadTorqueFilter::step(const Input& input, const Noise& noise) noexcept -> Output {
   if (state_.started == 0) start(input.speed_rad_s, 1.0F, input.torque_nm, config_.rated_torque_nm);
 
-  auto& [quiet, edge] = state_.models;
+  Model& quiet = state_.models[0];
+  Model& edge = state_.models[1];
   // Mix before the step: each model starts from the weighted mean, (E74).
   const float mu_e = state_.edge_probability;
   const float mu_q = 1.0F - mu_e;
@@ -97,52 +154,35 @@ auto LoadTorqueFilter::step(const Input& input, const Noise& noise) noexcept -> 
   const float quiet_prior = 1.0F - edge_prior;
   const float into_quiet = mu_e * (1.0F - kStayEdge_ratio) / quiet_prior;  // share of edge
   const float into_edge = mu_e * kStayEdge_ratio / edge_prior;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const float q = quiet.mean[k];
-    const float d = edge.mean[k] - q;
-    quiet.mean[k] = q + into_quiet * d;
-    edge.mean[k] = q + into_edge * d;
-  }
+  const auto difference = [&](std::size_t k) { return edge.mean[k] - quiet.mean[k]; };
+  const std::array<float, 3> apart{difference(0), difference(1), difference(2)};
 
-  const float g = input.duration_s / input.inertia_kg_m2;
+  const Shared shared(input, noise);
   const float q_edge = config_.edge_slope_1_s * input.duration_s * config_.rated_torque_nm;
   const float q_quiet2 = config_.drift_1_sqrt_s * config_.drift_1_sqrt_s * input.duration_s *
                          config_.rated_torque_nm * config_.rated_torque_nm;
-  Input used = input;
-  if (!input.speed_valid) {
-    // No measurement: alpha restarts at 0 with the tick, as if the prediction had been measured.
-    used.speed_rad_s = 0.0F;
-  }
-  predict(quiet, used, noise, g, q_quiet2);
-  predict(edge, used, noise, g, q_edge * q_edge);
-  if (!input.speed_valid) {
-    for (Model& m : state_.models) {
-      m.mean[0] = 0.0F;
-      m.covariance[0] = m.covariance[1] = m.covariance[2] = 0.0F;
-    }
-  }
+  const std::array<float, 3> from = quiet.mean;
+  const Innovation of_quiet = advance(quiet, from, apart, into_quiet, shared, q_quiet2);
+  const Innovation of_edge = advance(edge, from, apart, into_edge, shared, q_edge * q_edge);
 
-  Innovation of_quiet{};
   float consistency = 1.0F;
-  if (input.speed_valid) {
-    of_quiet = correct(quiet, noise.angle_variance);
-    const Innovation of_edge = correct(edge, noise.angle_variance);
-    if (of_quiet.variance > 0.0F && of_edge.variance > 0.0F) {
-      float l = 0.5F * (of_quiet.value * of_quiet.value / of_quiet.variance -
-                        of_edge.value * of_edge.value / of_edge.variance +
-                        log_positive(of_quiet.variance / of_edge.variance));
-      if (l > kLargestLogRatio) l = kLargestLogRatio;
-      if (!(l > -kLargestLogRatio)) l = -kLargestLogRatio;
-      const float weighted = edge_prior * exp_bounded(l);
-      float p = weighted / (quiet_prior + weighted);
-      if (p > 1.0F - kSmallestProbability) p = 1.0F - kSmallestProbability;
-      if (!(p > kSmallestProbability)) p = kSmallestProbability;
-      state_.edge_probability = p;
-      consistency = (1.0F - p) * of_quiet.value * of_quiet.value / of_quiet.variance +
-                    p * of_edge.value * of_edge.value / of_edge.variance;
-    }
-  } else {
+  if (!input.speed_valid) {
     state_.edge_probability = edge_prior;
+  } else if (of_quiet.variance > 0.0F && of_edge.variance > 0.0F) {
+    const float quiet_misfit = of_quiet.value * of_quiet.value / of_quiet.variance;
+    const float edge_misfit = of_edge.value * of_edge.value / of_edge.variance;
+    // The ratio of likelihoods, exp(l) sqrt(s_q / s_e): a root for the logarithm of it.
+    float l = 0.5F * (quiet_misfit - edge_misfit);
+    if (l > kLargestLogRatio) l = kLargestLogRatio;
+    if (!(l > -kLargestLogRatio)) l = -kLargestLogRatio;
+    const float weighted =
+        edge_prior * exp_bounded(l) * std::sqrt(of_quiet.variance / of_edge.variance);
+    float p = weighted / (quiet_prior + weighted);
+    if (p > 1.0F - kSmallestProbability) p = 1.0F - kSmallestProbability;
+    if (!(p > kSmallestProbability)) p = kSmallestProbability;
+    state_.edge_probability = p;
+    consistency = (1.0F - p) * of_quiet.value * of_quiet.value / of_quiet.variance +
+                  p * of_edge.value * of_edge.value / of_edge.variance;
   }
 
   const float p = state_.edge_probability;

@@ -100,6 +100,7 @@ void NoiseMeter::step(const Input& in) noexcept {
     if (++s.filled == kBlock) {
       close_block(in.idle || s.idle_measured == 0);
       if (in.idle && in.calibrated) s.idle_measured = 1;
+      s.noise_duration_s = 0.0F;
     }
   }
   s.last_change_rad_s = change;
@@ -108,7 +109,12 @@ void NoiseMeter::step(const Input& in) noexcept {
   s.last_speed_rad_s = in.speed_rad_s;
   s.torques_nm = {in.torque_nm, s.torques_nm[0], s.torques_nm[1]};
   s.unexplained_nm = {unexplained, s.unexplained_nm[0]};
-  if (s.blocks > 0) set_noise(h);
+  // Of a block's means it changes with the next block only, but for what counts beat against.
+  if (s.blocks > 0 && (h != s.noise_duration_s || counts() || s.counted != 0)) {
+    s.noise_duration_s = h;
+    s.counted = counts() ? 1U : 0U;
+    set_noise(h);
+  }
 }
 
 void NoiseMeter::close_block(bool of_speed) noexcept {

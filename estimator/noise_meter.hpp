@@ -72,6 +72,8 @@ class NoiseMeter {
     std::uint32_t ticks = 0;      // since the rest began anew
     std::uint32_t idle = 0;       // the last tick was idle
     std::uint32_t idle_measured = 0;
+    std::uint32_t counted = 0;      // the noise is one of counts
+    float noise_duration_s = 0.0F;  // of the tick that it was found for; 0: to be found anew
   };
 
   explicit NoiseMeter(const Config& config) noexcept;

@@ -53,17 +53,20 @@ bool PeriodPhasors::step(const Input& input) noexcept {
   }
   state_.theta_rad = wrapped(state_.theta_rad + input.angle_rad);
   const CosineSine e = cosine_sine(state_.theta_rad);
-  const std::array<float, 11> signals{input.channel[0],           input.channel[1],
-                                      input.channel[2],           input.channel[3],
-                                      input.channel[4],           input.channel[5],
-                                      input.current_residual_a,   input.motor.voltage_v.alpha,
-                                      input.motor.voltage_v.beta, input.motor.current_a.alpha,
-                                      input.motor.current_a.beta};
-  for (std::size_t k = 0; k < signals.size(); ++k) {  // (E12)
-    state_.cosine_sum[k] += signals[k] * e.cosine;
-    state_.sine_sum[k] += signals[k] * e.sine;
+  const auto add = [this, e](std::size_t k, float signal) {  // (E12)
+    state_.cosine_sum[k] += signal * e.cosine;
+    state_.sine_sum[k] += signal * e.sine;
+  };
+#pragma GCC unroll 6
+  for (std::size_t k = 0; k < kChannels; ++k) {
+    add(k, input.channel[k]);
+    state_.sum[k] += input.channel[k];
   }
-  for (std::size_t k = 0; k < kChannels; ++k) state_.sum[k] += signals[k];
+  add(6, input.current_residual_a);
+  add(7, input.motor.voltage_v.alpha);
+  add(8, input.motor.voltage_v.beta);
+  add(9, input.motor.current_a.alpha);
+  add(10, input.motor.current_a.beta);
   state_.current_square_sum += dot(input.motor.current_a, input.motor.current_a);
   ++state_.observations;
   // The interval before the first observation belongs to the window: N observations stand for N

@@ -54,11 +54,12 @@ namespace cutforce::estimator {
 
 // exp(x); relative error <= 2e-7 for |x| <= 87, clamped outside; (E53).
 [[nodiscard]] constexpr float exp_bounded(float x) noexcept {
-  if (x > 87.0F) x = 87.0F;
-  if (!(x > -87.0F)) x = -87.0F;
-  const float scaled = x * 1.44269504F;
-  const int power = static_cast<int>(scaled + (scaled < 0.0F ? -0.5F : 0.5F));
-  const float n = static_cast<float>(power);
+  if (!(magnitude(x) <= 87.0F)) x = x > 0.0F ? 87.0F : -87.0F;
+  // 1.5 * 2^23: a sum with it has no digits behind the point, and the whole number in its last
+  // bits.
+  constexpr float kRounder = 12582912.0F;
+  const float rounded = x * 1.44269504F + kRounder;
+  const float n = rounded - kRounder;
   const float r = (x - n * 0.693359375F) + n * 2.12194440e-4F;
   const float poly =
       ((((1.9875691500e-4F * r + 1.3981999507e-3F) * r + 8.3334519073e-3F) * r + 4.1665795894e-2F) *
@@ -67,7 +68,7 @@ namespace cutforce::estimator {
           r +
       5.0000001201e-1F;
   const float mantissa = poly * r * r + r + 1.0F;
-  const auto exponent = static_cast<std::uint32_t>(power + 127) << 23U;
+  const auto exponent = (std::bit_cast<std::uint32_t>(rounded) + 127U) << 23U;
   return mantissa * std::bit_cast<float>(exponent);
 }
 

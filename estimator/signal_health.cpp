@@ -13,7 +13,9 @@ constexpr float kTurn = 6.28318531F;
 constexpr std::uint32_t kSpeedBit = 1U << 6;
 
 // Values are compared to tell whether a converter delivered another code, so equality is meant.
-constexpr bool same(float a, float b) noexcept { return !(a < b) && !(a > b); }
+constexpr bool same(float a, float b) noexcept { return a == b; }
+
+constexpr float kLongAgo_s = 1e3F;  // where the time since the last clipping rests
 
 }  // namespace
 
@@ -25,38 +27,43 @@ auto SignalHealth::make(const Config& config) noexcept -> std::expected<SignalHe
 void SignalHealth::raise(Fault fault) noexcept {
   // Half a tick more, so that a hold of 0 still shows for the tick that saw it.
   state_.left_s[static_cast<std::size_t>(fault)] = config_.hold_s + 0.5F * config_.tick_period_s;
+  state_.held.insert(fault);
+}
+
+// A tick less of every hold.
+void SignalHealth::run_down() noexcept {
+  FaultSet held{};
+  for (std::size_t k = 0; k < kFaultCount; ++k) {
+    float& left = state_.left_s[k];
+    left = std::max(left - config_.tick_period_s, 0.0F);
+    if (left > 0.0F) held.insert(static_cast<Fault>(k));
+  }
+  state_.held = held;
 }
 
 auto SignalHealth::step(const Input& input) noexcept -> Output {
-  for (float& left : state_.left_s) left = std::max(left - config_.tick_period_s, 0.0F);
+  if (!state_.held.empty()) run_down();
   const float magnitude = std::fabs(input.frequency_rad_s);
   const bool turning = magnitude >= config_.minimum_frequency_rad_s && magnitude < 1e6F;
   if (state_.is_picked != 0) {
-    const Observation& o = state_.picked;
-    const float elapsed_s = o.elapsed_periods * config_.sample_period_s;
+    const float elapsed_s = state_.picked_periods * config_.sample_period_s;
+    state_.picked.angle_rad = turning ? input.frequency_rad_s * elapsed_s : 0.0F;
     const Tick tick{.frequency_rad_s = input.frequency_rad_s,
                     .period_s = turning ? kTurn / magnitude : 0.0F,
                     .elapsed_s = elapsed_s,
-                    .sample = {.channel = {o.voltage_v[0], o.voltage_v[1], o.voltage_v[2],
-                                           o.current_a[0], o.current_a[1], o.current_a[2]},
-                               .motor = o.motor,
-                               .current_residual_a = o.current_residual_a,
-                               .angle_rad = turning ? input.frequency_rad_s * elapsed_s : 0.0F}};
+                    .sample = state_.picked};
     judge_channels(tick);
     judge_rotation(tick);
   }
   next_place();
   if (turning && input.speed_present) judge_speed(input);
 
-  const auto over = [this](Fault fault) {
-    return !(state_.left_s[static_cast<std::size_t>(fault)] > 0.0F);
-  };
-  if (over(Fault::kStuckChannel)) state_.seen.stuck_channels = 0;
-  if (over(Fault::kLostPhase)) state_.seen.lost_channels = 0;
-  if (over(Fault::kClipped)) state_.seen.clipped_channels = 0;
+  const FaultSet held = state_.held;
+  if (!held.contains(Fault::kStuckChannel)) state_.seen.stuck_channels = 0;
+  if (!held.contains(Fault::kLostPhase)) state_.seen.lost_channels = 0;
+  if (!held.contains(Fault::kClipped)) state_.seen.clipped_channels = 0;
   Output output = state_.seen;
-  for (std::size_t k = 0; k < kFaultCount; ++k)
-    if (state_.left_s[k] > 0.0F) output.faults.insert(static_cast<Fault>(k));
+  output.faults = output.faults | held;
   if (state_.raw_latched != 0) output.faults.insert(Fault::kRawPwm);
   return output;
 }
@@ -70,30 +77,40 @@ void SignalHealth::next_place() noexcept {
   state_.at_end_channels = 0;
 }
 
+// Nearly always a channel has moved, is nowhere near its end and was not clipped lately: that is
+// told first, in a third of the instructions.
 void SignalHealth::judge_channels(const Tick& tick) noexcept {
   for (std::size_t kind = 0; kind < 2; ++kind) {
     const std::size_t first = 3 * kind;
     const std::size_t end = first + measured(kind);
-    std::size_t moving = end;  // a channel of this kind that has just changed
+    bool some_move = false;  // channels of this kind have just changed
+    bool some_rest = false;  // or have not for long enough to be judged
     for (std::size_t k = first; k < end; ++k) {
       Channel& channel = state_.channel[k];
       const float value = tick.sample.channel[k];
-      judge_clipped(tick, k, value);
-      if (!same(value, channel.held)) {
-        channel = {.held = value, .same_s = 0.0F, .clip_s = channel.clip_s, .same_count = 0};
-        moving = k;
+      const bool moved = !same(value, channel.held);
+      if (channel.same_count >= 3 || channel.clip_s < kLongAgo_s || state_.at_end_channels != 0)
+        judge_clipped(tick, k, value);
+      if (moved) {
+        channel.held = value;
+        channel.same_s = 0.0F;
+        channel.same_count = 0;
+        some_move = true;
         continue;
       }
       channel.same_s += tick.elapsed_s;
       ++channel.same_count;
+      some_rest = some_rest || channel.same_count >= 4;
     }
-    for (std::size_t k = first; k < end; ++k) judge_stuck(tick, k, moving != end);
+    if (!(some_rest && some_move && tick.period_s > 0.0F)) continue;
+    for (std::size_t k = first; k < end; ++k) judge_stuck(tick, k);
   }
 }
 
-void SignalHealth::judge_stuck(const Tick& tick, std::size_t k, bool others_move) noexcept {
+// While others of its kind move.
+void SignalHealth::judge_stuck(const Tick& tick, std::size_t k) noexcept {
   const Channel& channel = state_.channel[k];
-  if (!(tick.period_s > 0.0F) || !others_move || channel.same_count < 4) return;
+  if (channel.same_count < 4) return;
   const std::size_t first = k < 3 ? 0 : 3;
   const float floor = first == 0 ? config_.voltage_floor_v : config_.current_floor_a;
   const auto& a = state_.amplitude;
@@ -108,7 +125,7 @@ void SignalHealth::judge_stuck(const Tick& tick, std::size_t k, bool others_move
 void SignalHealth::judge_clipped(const Tick& tick, std::size_t k, float value) noexcept {  // (E19)
   constexpr float kUnknownPeriod_s = 0.05F;
   Channel& channel = state_.channel[k];
-  channel.clip_s = std::min(channel.clip_s + tick.elapsed_s, 1e3F);
+  channel.clip_s = std::min(channel.clip_s + tick.elapsed_s, kLongAgo_s);
   const float range = k < 3 ? config_.voltage_range_v : config_.current_range_a;
   const bool at_end = (state_.at_end_channels >> k & 1U) != 0;
   const bool was_flat = k >= 3 && tick.period_s > 0.0F && !same(value, channel.held) &&

@@ -51,23 +51,16 @@ void SignalHealth::judge_rotation(const Tick& tick) noexcept {
     forget_streaks();
     return;
   }
-  RawPwmDetector raw;
-  raw.restore(state_.raw);
-  if (raw.step({.motor = tick.sample.motor,
-                .angle_rad = tick.sample.angle_rad,
-                .elapsed_s = tick.elapsed_s}))
+  if (state_.raw.step({.motor = tick.sample.motor,
+                       .angle_rad = tick.sample.angle_rad,
+                       .elapsed_s = tick.elapsed_s}))
     state_.raw_latched = 1;
-  state_.raw = raw.state();
-
-  PeriodPhasors phasors;
-  phasors.restore(state_.phasors);
   state_.window_s += tick.elapsed_s;
-  if (phasors.step(tick.sample)) {
-    judge_period(tick, phasors.result());
-    phasors.begin();
+  if (state_.phasors.step(tick.sample)) {
+    judge_period(tick, state_.phasors.result());
+    state_.phasors.begin();
     state_.window_s = 0.0F;
   }
-  state_.phasors = phasors.state();
 }
 
 void SignalHealth::forget_streaks() noexcept {
@@ -88,10 +81,7 @@ void SignalHealth::judge_period(const Tick& tick, const PeriodPhasors::Result& r
     state_.seen.lost_channels |= lost_now;
   }
   // What a missing channel does to the sequences and to the flux is no news.
-  const auto holds = [this](Fault fault) {
-    return state_.left_s[static_cast<std::size_t>(fault)] > 0.0F;
-  };
-  if (holds(Fault::kLostPhase) || holds(Fault::kStuckChannel)) {
+  if (state_.held.contains(Fault::kLostPhase) || state_.held.contains(Fault::kStuckChannel)) {
     forget_streaks();
     return;
   }

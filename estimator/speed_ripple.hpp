@@ -58,9 +58,10 @@ class SpeedRipple {
   constexpr void forget() noexcept { state_ = State{}; }
 
   [[nodiscard]] constexpr bool applies() const noexcept {
+    if (!(state_.learned_s > kTime_s)) return false;
     float power = 0.0F;
     for (const float a : state_.amplitude_rad_s) power += a * a;
-    return state_.learned_s > kTime_s && power > kStandsOut_ratio * state_.rest_variance;
+    return power > kStandsOut_ratio * state_.rest_variance;
   }
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }

@@ -27,6 +27,7 @@ StatorResistance::StatorResistance(const Config& config) noexcept : config_(conf
   const float sf = a * config.iron_torque_sigma_nm;
   state_.mean = {a, 0.0F, a * config.iron_torque_nm};
   state_.covariance = {sa * sa, 0.0F, 0.0F, sr * sr, 0.0F, sf * sf};
+  find_change();
 }
 
 auto StatorResistance::make(const Config& config) noexcept
@@ -65,6 +66,7 @@ void StatorResistance::step(const Input& in) noexcept {
   s[5] += in.duration_s;
   if (s[5] >= kBlock_s) {
     learn();
+    find_change();
     s.fill(0.0F);
     state_.first_torque_nm = in.torque_nm;
   }
@@ -115,19 +117,18 @@ void StatorResistance::learn() noexcept {
   if (!(p22 > 0.0F)) p22 = 0.0F;
 }
 
-float StatorResistance::change_ohm() const noexcept {
+void StatorResistance::find_change() noexcept {
   const float a = state_.mean[0];
-  if (!(a > 0.0F)) return 0.0F;
+  if (!(a > 0.0F)) {
+    change_ohm_ = 0.0F;
+    change_sigma_ohm_ = config_.resistance_sigma_ratio * config_.stator_resistance_ohm;
+    return;
+  }
   const float change = state_.mean[1] / a;
   const float most = kLargestRise_ratio * config_.stator_resistance_ohm;
   const float least = -kLargestFall_ratio * config_.stator_resistance_ohm;
-  return change > most ? most : (change < least ? least : change);
-}
-
-float StatorResistance::change_sigma_ohm() const noexcept {
-  const float a = state_.mean[0];
-  return a > 0.0F ? std::sqrt(state_.covariance[3]) / a
-                  : config_.resistance_sigma_ratio * config_.stator_resistance_ohm;
+  change_ohm_ = change > most ? most : (change < least ? least : change);
+  change_sigma_ohm_ = std::sqrt(state_.covariance[3]) / a;
 }
 
 }  // namespace cutforce::estimator

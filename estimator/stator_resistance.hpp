@@ -72,17 +72,24 @@ class StatorResistance {
       const Config& config) noexcept;
   void step(const Input& input) noexcept;
 
-  [[nodiscard]] float change_ohm() const noexcept;  // dR, within -50 and +100 %
-  [[nodiscard]] float change_sigma_ohm() const noexcept;
+  // Found anew with each block only, asked for several times a tick.
+  [[nodiscard]] float change_ohm() const noexcept { return change_ohm_; }  // within -50 and +100 %
+  [[nodiscard]] float change_sigma_ohm() const noexcept { return change_sigma_ohm_; }
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
-  void restore(const State& state) noexcept { state_ = state; }
+  void restore(const State& state) noexcept {
+    state_ = state;
+    find_change();
+  }
 
  private:
   explicit StatorResistance(const Config& config) noexcept;
   void learn() noexcept;
+  void find_change() noexcept;
 
   Config config_;
+  float change_ohm_ = 0.0F;  // dR
+  float change_sigma_ohm_ = 0.0F;
   State state_{};
 };
 

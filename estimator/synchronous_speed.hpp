@@ -99,7 +99,6 @@ class SynchronousSpeed {
     float flux_square_v2s2 = 0.0F;
     float current_square_a2 = 0.0F;
     std::uint32_t sample = 0;
-    std::uint32_t started = 0;  // 0: there is no sample before the next one
   };
 
   // Fails iff check() does.
@@ -111,7 +110,13 @@ class SynchronousSpeed {
 
   // One raw sample; an output with the last sample of each window. Needs at least three samples
   // to an electrical period.
-  [[nodiscard]] std::optional<Output> step(const MotorSample& sample) noexcept;
+  [[nodiscard]] std::optional<Output> step(const MotorSample& sample) noexcept {
+    if (!add(sample)) return std::nullopt;
+    return close_window();
+  }
+  // The same in two parts: true with the last sample of a window, which close_window() then ends.
+  [[nodiscard]] [[gnu::always_inline]] bool add(const MotorSample& sample) noexcept;
+  [[nodiscard]] Output close_window() noexcept;
 
   // Drops the window and the flux so far. For gaps in the signals.
   constexpr void restart() noexcept { state_ = {}; }
@@ -128,15 +133,38 @@ class SynchronousSpeed {
                      (1.0F + 0.5F * config.flux_leak_rad_s * config.sample_period_s)),
         end_samples_(config.samples_per_window / 5) {}
 
-  void integrate_flux(const MotorSample& sample) noexcept;
-  [[nodiscard]] Output close_window() noexcept;
-
   Config config_;
   float flux_keep_;
   float flux_gain_s_;
   std::uint32_t end_samples_;
   State state_{};
 };
+
+inline bool SynchronousSpeed::add(const MotorSample& sample) noexcept {
+  const SpaceVector i = sample.current_a;
+  const float ohm = config_.stator_resistance_ohm;
+  const SpaceVector emf{.alpha = sample.voltage_v.alpha - ohm * i.alpha,
+                        .beta = sample.voltage_v.beta - ohm * i.beta};
+  // (E28)
+  const SpaceVector flux{
+      .alpha = flux_keep_ * state_.flux_vs.alpha + flux_gain_s_ * (emf.alpha + state_.emf_v.alpha),
+      .beta = flux_keep_ * state_.flux_vs.beta + flux_gain_s_ * (emf.beta + state_.emf_v.beta)};
+  state_.flux_vs = flux;
+  state_.emf_v = emf;
+  const SpaceVector rotor_flux{.alpha = flux.alpha - config_.leakage_inductance_h * i.alpha,
+                               .beta = flux.beta - config_.leakage_inductance_h * i.beta};
+  const SpaceVector vector = config_.vector == Vector::kFlux ? rotor_flux : i;
+  // Before the first sample stands the null vector, from which nothing has turned.
+  const float turned = angle_of(dot(vector, state_.vector), cross(vector, state_.vector));
+  state_.vector = vector;
+
+  ++state_.sample;
+  state_.angle_rad += turned;
+  if (state_.sample > config_.samples_per_window - end_samples_) state_.angle_end_rad += turned;
+  state_.flux_square_v2s2 += dot(rotor_flux, rotor_flux);
+  state_.current_square_a2 += dot(i, i);
+  return state_.sample >= config_.samples_per_window;
+}
 
 static_assert(std::is_trivially_copyable_v<SynchronousSpeed>);
 

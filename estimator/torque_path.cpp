@@ -17,26 +17,6 @@ auto TorquePath::make(const Config& config) noexcept -> std::expected<TorquePath
                      .monitor = *SynthesizedMonitor::make(config.monitor)}};
 }
 
-auto TorquePath::step(const Input& input) noexcept -> std::optional<Output> {
-  const MotorSample motor = input.motor_valid ? input.motor : MotorSample{};
-  const auto power =
-      blocks_.power.step({.sample = motor, .electrical_rad_s = sums_.electrical_rad_s});
-  const auto synchronous = blocks_.synchronous.step(motor);
-
-  // Trapezoid, as AirGapPower does.
-  const float speed = input.speed_valid ? input.speed_rad_s : 0.0F;
-  const float before = sums_.continued != 0 ? sums_.last_speed_rad_s : speed;
-  sums_.continued = 1;
-  sums_.last_speed_rad_s = speed;
-  sums_.speed_rad_s += 0.5F * (before + speed);
-  sums_.meter_w += input.meter_valid ? input.power_meter_w : 0.0F;
-  sums_.motor_samples += input.motor_valid ? 1U : 0U;
-  sums_.speed_samples += input.speed_valid ? 1U : 0U;
-  sums_.meter_samples += input.meter_valid ? 1U : 0U;
-  if (!power || !synchronous) return std::nullopt;
-  return close_window(*power, *synchronous, input.feed);
-}
-
 void TorquePath::restart() noexcept {
   blocks_.power.restart();
   blocks_.synchronous.restart();
@@ -44,9 +24,9 @@ void TorquePath::restart() noexcept {
   sums_ = {.idle_current_square_a2 = sums_.idle_current_square_a2};
 }
 
-auto TorquePath::close_window(const AirGapPower::Output& power,
-                              const SynchronousSpeed::Output& synchronous, Feed feed) noexcept
-    -> Output {
+auto TorquePath::close_window(Feed feed) noexcept -> Output {
+  const AirGapPower::Output power = blocks_.power.close_window();
+  const SynchronousSpeed::Output synchronous = blocks_.synchronous.close_window();
   const Window means = window(power, synchronous);
   sums_.electrical_rad_s = synchronous.valid ? synchronous.electrical_rad_s : 0.0F;
   Output output{};

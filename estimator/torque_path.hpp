@@ -132,7 +132,13 @@ class TorquePath {
   [[nodiscard]] static std::expected<TorquePath, ConfigError> make(const Config& config) noexcept;
 
   // One raw sample; an output with the last sample of each window.
-  [[nodiscard]] std::optional<Output> step(const Input& input) noexcept;
+  [[nodiscard]] std::optional<Output> step(const Input& input) noexcept {
+    if (!add(input)) return std::nullopt;
+    return close_window(input.feed);
+  }
+  // The same in two parts: true with the last sample of a window, which close_window() then ends.
+  [[nodiscard]] [[gnu::always_inline]] bool add(const Input& input) noexcept;
+  [[nodiscard]] Output close_window(Feed feed) noexcept;
 
   // Samples are missing: the window begins anew, what was learned stays.
   void restart() noexcept;
@@ -157,9 +163,6 @@ class TorquePath {
   TorquePath(const Config& config, const Blocks& blocks) noexcept
       : config_(config), blocks_(blocks) {}
 
-  [[nodiscard]] Output close_window(const AirGapPower::Output& power,
-                                    const SynchronousSpeed::Output& synchronous,
-                                    Feed feed) noexcept;
   [[nodiscard]] Window window(const AirGapPower::Output& power,
                               const SynchronousSpeed::Output& synchronous) noexcept;
   void find_speeds(const SynchronousSpeed::Output& synchronous, Window& window) const noexcept;
@@ -178,6 +181,26 @@ class TorquePath {
   Blocks blocks_;
   Sums sums_{};
 };
+
+inline bool TorquePath::add(const Input& input) noexcept {
+  const MotorSample motor = input.motor_valid ? input.motor : MotorSample{};
+  const bool power_ends = blocks_.power.add(motor, sums_.electrical_rad_s);
+  const bool ends = blocks_.synchronous.add(motor) && power_ends;
+
+  // Trapezoid, as AirGapPower does.
+  const float speed = input.speed_valid ? input.speed_rad_s : 0.0F;
+  const float before = sums_.continued != 0 ? sums_.last_speed_rad_s : speed;
+  sums_.continued = 1;
+  sums_.last_speed_rad_s = speed;
+  sums_.speed_rad_s += 0.5F * (before + speed);
+  if (input.meter_valid) {
+    sums_.meter_w += input.power_meter_w;
+    ++sums_.meter_samples;
+  }
+  if (input.motor_valid) ++sums_.motor_samples;
+  if (input.speed_valid) ++sums_.speed_samples;
+  return ends;
+}
 
 static_assert(std::is_trivially_copyable_v<TorquePath>);
 static_assert(std::is_trivially_copyable_v<TorquePath::State>);

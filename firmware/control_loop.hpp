@@ -73,19 +73,15 @@ class ControlLoop {
 
   // What the loop itself keeps between samples.
   struct Own {
-    std::int64_t time_ns = 0;
+    float elapsed_periods = 0.0F;        // in the estimate window so far
+    std::uint32_t commands_present = 0;  // of kCommands, in the last sample
     std::uint32_t started = 0;
-    float elapsed_periods = 0.0F;  // in the estimate window so far
     std::uint32_t estimates = 0;   // in the control period so far
     float turning_s = 0.0F;        // with sound signals, saturating
     float frequency_rad_s = 0.0F;  // electrical, of the last tick
-    float speed_rad_s = 0.0F;      // as measured
     float shaft_rad_s = 0.0F;      // as estimated
-    std::uint32_t speed_present = 0;
     float speed_sum_rad_s = 0.0F;  // over the control period so far
     std::uint32_t speed_count = 0;
-    float meter_w = 0.0F;
-    std::uint32_t meter_present = 0;
     std::uint32_t force_due = 0;  // estimates in the control period that had no force
     float calibrated_s = 0.0F;    // of idle calibration so far
     float diameter_m = 0.0F;
@@ -106,13 +102,12 @@ class ControlLoop {
     std::uint32_t part_start = 0;   // 1: a part has started in the control period so far
     std::uint32_t override_reported = 0;
     float override_reported_pct = 0.0F;
-    estimator::Calibration calibration{};
     estimator::TorquePath::Output path{};
     std::uint32_t has_path = 0;
     control::LawOutput law{};         // of the last control tick
     std::uint32_t saturated_low = 0;  // likewise
     std::uint32_t saturated_high = 0;
-    LoopOutput last{};
+    estimator::FaultSet published{};  // with the last output
   };
 
   struct State {
@@ -148,11 +143,35 @@ class ControlLoop {
  private:
   explicit ControlLoop(const Config& config) noexcept;
 
+  static constexpr std::uint32_t kCommands =
+      hal::bit(hal::Signal::kMeasuredForce) | hal::bit(hal::Signal::kFeedActive) |
+      hal::bit(hal::Signal::kOverrideApplied) | hal::bit(hal::Signal::kWorkpieceDiameter) |
+      hal::bit(hal::Signal::kEnable) | hal::bit(hal::Signal::kPartStart);
+
   void restart() noexcept;
+  // A sample that the gate let through.
+  struct Passed {
+    float elapsed_periods;
+    float counted_periods;  // towards the estimate window
+    std::uint32_t at_end_channels;
+    std::uint32_t present;  // of SampleGate
+  };
+  [[nodiscard]] std::optional<LoopOutput> step_carefully(const hal::Sample& sample,
+                                                         std::uint32_t present) noexcept;
+  [[nodiscard]] std::optional<LoopOutput> go_on(const hal::Sample& sample,
+                                                const estimator::SampleGate::Values& values,
+                                                const Passed& passed) noexcept;
+  void estimate_from(const estimator::MotorSample& motor,
+                     const estimator::SampleGate::Values& values, const Passed& passed) noexcept;
   void note_commands(const hal::Sample& sample) noexcept;
-  void note_slow(std::uint32_t present) noexcept;
-  void observe_motor(const estimator::SampleGate::Output& gated) noexcept;
-  void estimate_from(const estimator::FrontEnd::Output& front, float elapsed_periods) noexcept;
+  void close_path() noexcept;
+  void note_speed(float sum_rad_s, std::uint32_t count) noexcept;
+  void calibrate_from(const estimator::SampleGate::Values& values) noexcept;
+  [[nodiscard]] std::int64_t time_ns() const noexcept { return gate_.state().last_time_ns; }
+  [[nodiscard]] float speed_rad_s() const noexcept { return gate_.values().speed_rad_s; }
+  [[nodiscard]] bool speed_present() const noexcept {
+    return (gate_.state().last_present & estimator::SampleGate::kSpeed) != 0;
+  }
   void calibrate(const estimator::FusedObserver::Output& fused) noexcept;
   void apply_calibration(const estimator::IdleCalibration::Result& result) noexcept;
   void watch_health(LoopOutput& out) noexcept;
@@ -166,18 +185,40 @@ class ControlLoop {
   void control_tick(LoopOutput& out) noexcept;
   void publish_control(LoopOutput& out) const noexcept;
 
-  Config config_;
+  // What is left to read of the configuration once the parts are made: 64 bytes for 1100.
+  struct Settings {
+    EstimatorName estimator;
+    bool control;
+    bool current_w_present;
+    bool sensorless;
+    bool calibrates;
+    std::uint32_t estimates_per_control;
+    float close_at_periods;  // of an estimate window
+    float sample_period_s;
+    float tick_period_s;
+    float dynamometer_sigma_n;
+    float dynamometer_cut_n;  // above it the tool cuts
+    float voltage_lead_s;
+    float force_minimum_speed_rad_s;
+    float programmed_speed_rad_s;
+    float fused_pole_pairs;
+    float path_pole_pairs;
+  };
+
+  // In this order because a Cortex-M7 reaches floats no further than 1020 bytes from a base without
+  // an instruction more: what every sample needs stands in front.
+  Settings config_;
+  Own own_{};
   estimator::SampleGate gate_;
   estimator::FrontEnd front_end_;
+  estimator::FusedObserver fused_;
   estimator::SignalHealth health_;
   estimator::IdleCalibration calibration_;
-  estimator::FusedObserver fused_;
   estimator::TorquePath path_;
   estimator::LoadFriction load_friction_;
   estimator::CuttingForce force_;
-  control::ControlPath controller_;
-  Own own_{};
   hal::Command command_{};
+  control::ControlPath controller_;
 };
 
 static_assert(std::is_trivially_copyable_v<ControlLoop>);

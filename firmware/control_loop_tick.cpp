@@ -14,6 +14,7 @@ constexpr float kDiameterMost_m = 1e3F;
 }  // namespace
 
 void ControlLoop::note_commands(const hal::Sample& sample) noexcept {
+  own_.commands_present = sample.present & kCommands;
   if (sample.has(Signal::kFeedActive)) {
     // An active feed may still be the approach: contact is told from the torque then.
     own_.feed = sample.feed_active <= 0.5F ? 1U : 0U;  // NaN: not known
@@ -67,7 +68,7 @@ void ControlLoop::control_tick(LoopOutput& out) noexcept {
                         .override_reported = own_.override_reported != 0,
                         .permission = permission(),
                         .part_start = own_.part_start != 0});
-  command_ = {.time_ns = own_.time_ns,
+  command_ = {.time_ns = time_ns(),
               .override_pct = controlled.override_pct,
               .override_code = controlled.override_code,
               .controlling = controlled.controlling};

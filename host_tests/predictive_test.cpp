@@ -178,7 +178,7 @@ TEST(Predictive, DoesNotRiseWithTheReadingOfAJumpUpwards) {
     for (int i = 0; i < 100; ++i) std::ignore = law.step(cutting(200.0F, 100.0F));  // it may rise
     const auto input = cutting(2.0F * static_cast<float>(factor_pct), 100.0F);
     const float answer_pct = law.step(input).override_pct;
-    if (law.state().since_jump_s <= 0.0F) {
+    if (law.state().own.since_jump_s <= 0.0F) {
       EXPECT_LE(answer_pct, 100.0F) << factor_pct;
     }
   }

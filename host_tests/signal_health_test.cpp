@@ -482,11 +482,11 @@ TEST(SignalHealth, StaysFiniteUnderAnythingThatTheGateLetsThrough) {
     (void)health.step(
         {std::bit_cast<float>(static_cast<std::uint32_t>(random())), any(1e6F), true});
     const auto& s = health.state();
-    for (const float x : s.phasors.cosine_sum) ASSERT_TRUE(std::isfinite(x)) << n;
+    for (const float x : s.phasors.state().cosine_sum) ASSERT_TRUE(std::isfinite(x)) << n;
     for (const float x : s.amplitude) ASSERT_TRUE(std::isfinite(x)) << n;
     for (const float x : s.left_s) ASSERT_TRUE(std::isfinite(x)) << n;
-    ASSERT_TRUE(std::isfinite(s.phasors.theta_rad + s.raw.elapsed_s + s.raw.turned_rad +
-                              s.window_s + s.order_s + s.flux_s));
+    ASSERT_TRUE(std::isfinite(s.phasors.state().theta_rad + s.raw.state().elapsed_s +
+                              s.raw.state().turned_rad + s.window_s + s.order_s + s.flux_s));
   }
 }
 

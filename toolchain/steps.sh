@@ -26,6 +26,21 @@ step() {
   exit 1
 }
 
+# try TITLE COMMAND...: a step that may fail; what depends on it is then left out.
+try() {
+  local title=$1 began=$EPOCHREALTIME
+  shift
+  printf '  %-46s' "$title"
+  printf '\n== %s\n$ %s\n' "$title" "$*" >> "$log"
+  if "$@" >> "$log" 2>&1 < /dev/null; then
+    printf '%8s s\n' "$(elapsed_s "$began")"
+    return
+  fi
+  printf '%8s s   not here\n' "$(elapsed_s "$began")"
+  tail -n 3 "$log" | sed 's/^/      /'
+  return 1
+}
+
 # shown_step TITLE COMMAND...: for a program whose output is the point. Its standard error stays
 # the terminal, so that it shows its progress there.
 shown_step() {

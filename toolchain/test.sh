@@ -1,9 +1,12 @@
 #!/usr/bin/env bash
-# Builds cutforce and runs every test, in two builds:
+# Builds cutforce and runs every test, in three builds:
 #   host          every unit test under AddressSanitizer and UndefinedBehaviorSanitizer
 #   host-release  the same tests at -O2 (the same bits must come out), what needs full speed, the
 #                 gates on the core's archives, and the tests that read the tree
-# Does its own set-up. The last line is the count; exit status 0 iff nothing failed.
+#   aarch64       the core's tests on the board's processor (qemu-user), the service in an emulated
+#                 board with the kernel's own drivers, and the disk image
+# Does its own set-up. Where the packages of the last cannot be had, it is left out and counted as
+# one skipped test. The last line is the count; exit status 0 iff nothing failed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=toolchain/steps.sh
@@ -76,6 +79,16 @@ for preset in host host-release; do
 done
 run_tests host build/host
 run_tests host-release build/release
+
+if try "set up the board" toolchain/setup.sh build aarch64 guest image &&
+  try "fetch the board's packages" toolchain/board/fetch.sh; then
+  step "configure aarch64" cmake --preset aarch64
+  step "build aarch64" cmake --build --preset aarch64
+  run_tests aarch64 build/aarch64
+else
+  echo "      skipped: every test in the emulated board"
+  skipped=$((skipped + 1))
+fi
 
 printf '\nFull output: %s, after %s s\n' "$log" "$(elapsed_s "$began")"
 echo "$passed passed, $failed failed, $skipped skipped"

@@ -53,18 +53,25 @@ class SamplePath {
     flux_.set_frequency(210.0F);
   }
 
-  void step(const Sample& sample) noexcept {
-    const auto gated = gate_.step(gate_input(sample));
-    const auto& values = gate_.values();
-    const auto front =
-        front_end_.step({.voltage_v = values.voltage_v, .current_a = values.current_a});
-    health_.observe({.voltage_v = values.voltage_v,
-                     .current_a = values.current_a,
-                     .motor = front.motor,
-                     .current_residual_a = front.current_residual_a,
-                     .elapsed_periods = gated.elapsed_periods,
-                     .at_end_channels = gated.at_end_channels});
-    flux_.step(front.motor, gated.elapsed_periods);
+  void step(const Sample& s) noexcept {
+    const SampleGate::Values values{.voltage_v = {s.voltage_v[0], s.voltage_v[1], s.voltage_v[2]},
+                                    .current_a = {s.current_a[0], s.current_a[1], s.current_a[2]},
+                                    .speed_rad_s = s.speed_rad_s,
+                                    .power_w = s.power_meter_w};
+    if (!gate_.accepts(s.time_ns, values, SampleGate::kSpeed | SampleGate::kPower)) {
+      keep(gate_.step(gate_input(s)));
+      return;
+    }
+    const auto motor = front_end_.motor(values.voltage_v, values.current_a);
+    if (health_.wants(1.0F, 0)) {
+      health_.look({.voltage_v = values.voltage_v,
+                    .current_a = values.current_a,
+                    .motor = motor,
+                    .current_residual_a = front_end_.residual_a(values.current_a),
+                    .elapsed_periods = 1.0F,
+                    .at_end_channels = 0});
+    }
+    flux_.step(motor, 1.0F);
     keep(flux_);
   }
 

@@ -38,10 +38,10 @@ TEST(CoreSymbols, OfTheBusNeedNobodyElse) {
   EXPECT_EQ(result.exit_status, 0) << result.output;
 }
 
-TEST(CoreSymbols, OfTheLoopNeedOnlyTheEstimatorAndTheControllers) {
+TEST(CoreSymbols, OfTheLoopNeedOnlyTheEstimatorTheControllersAndTheBus) {
   const auto result =
       gate(" " + quoted(CUTFORCE_FIRMWARE_ARCHIVE) + " " + quoted(CUTFORCE_ESTIMATOR_ARCHIVE) +
-           " " + quoted(CUTFORCE_CONTROL_ARCHIVE));
+           " " + quoted(CUTFORCE_CONTROL_ARCHIVE) + " " + quoted(CUTFORCE_CAN_ARCHIVE));
   EXPECT_EQ(result.exit_status, 0) << result.output;
 }
 

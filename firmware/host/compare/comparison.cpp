@@ -47,6 +47,7 @@ void on_threads(std::size_t count, unsigned threads, const std::function<void(st
         ++done;
         if (tell) tell(done, count);
       }
+      if (tell) tell(done, count);  // the others may have left it nothing to do
     } catch (...) {
       const std::scoped_lock lock(mutex);
       if (!failure) failure = std::current_exception();
