@@ -151,8 +151,9 @@ AFTER_RESET = f"""
 ( {board.SERVICE} ) 2>&1 & service=$!
 canplayer -l i -I /etc/cutforce/samples.log &
 canplayer -l i -I /etc/cutforce/high.log &
-timeout 5 candump -L -n 100 can1,181:7FF
+timeout 8 candump -L -n 200 can1,181:7FF  # 4 s: it is fed
 kill -TERM $service; wait $service
+sleep 4; echo "the watchdog was stopped"
 """
 
 
@@ -172,7 +173,8 @@ class AStarvedWatchdog(unittest.TestCase):
             self.assertEqual(guest.finish(), 0)
             said = can_log("\n".join(li for li in guest.lines if " 181#" in li).encode())
         states = [int(decode(frame)[1]["State"]) for frame in said]
-        self.assertEqual(len(said), 100)
+        self.assertEqual(len(said), 200)
+        self.assertIn("the watchdog was stopped", guest.lines)
         self.assertEqual(max(states), READY)
         self.assertEqual({decode(frame)[1]["Enabled"] for frame in said}, {0})
 
