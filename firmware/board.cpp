@@ -223,6 +223,13 @@ bool Board::stopping(const BoardHealth& health) const noexcept {
          (health.output_failed && !own_.health.output_failed) || (down && !was_down);
 }
 
+// The end is the one silence that is announced, so that the CNC need not guess.
+bool Board::may_speak() const noexcept {
+  if (!supervision_.silent) return true;
+  const bool down = own_.health.has_bus && is_down(own_.health.bus);
+  return supervision_.state == SupervisorState::kDead && !down && !report_.has_told(values());
+}
+
 auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> BoardOutput {
   const std::uint32_t missed = own_.health.missed_ticks + health.missed_ticks;
   const bool at_once = stopping(health);
@@ -244,7 +251,7 @@ auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> Boa
 
   BoardOutput out{};
   out.supervision = supervision_;
-  if (!supervision_.silent) out.frame = report_.due(now_ns, values());
+  if (may_speak()) out.frame = report_.due(now_ns, values());
   if (!supervision_.alive) {
     own_.alive = 0;
     own_.alive_ns = now_ns;

@@ -138,6 +138,7 @@ class Board {
   void note_foreign() noexcept;
   [[nodiscard]] bool checks_passed() const noexcept;
   [[nodiscard]] bool stopping(const BoardHealth& health) const noexcept;
+  [[nodiscard]] bool may_speak() const noexcept;
   [[nodiscard]] control::Permission permission() const noexcept;
   [[nodiscard]] float force_limit_n() const noexcept;
   [[nodiscard]] BoardValues values() const noexcept;

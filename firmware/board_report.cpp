@@ -160,6 +160,12 @@ auto BoardReport::due(std::int64_t now_ns, const BoardValues& values) noexcept
   return std::nullopt;
 }
 
+bool BoardReport::has_told(const BoardValues& values) const noexcept {
+  return emergency_of(values.state, values.reason) == state_.emergency &&
+         values.override.override_pct.value_or(0xFF) == state_.last_override_pct &&
+         values.state == state_.last_state && values.reason == state_.last_reason;
+}
+
 void BoardReport::sent() noexcept {
   const auto kind = static_cast<Kind>(state_.offered);
   const std::int64_t now_ns = state_.offered_ns;

@@ -63,6 +63,8 @@ class BoardReport {
                                                    const BoardValues& values) noexcept;
   // The frame that due() made last is on its way.
   void sent() noexcept;
+  // Whether the last Override and the last Emergency say this state and what goes out in it.
+  [[nodiscard]] bool has_told(const BoardValues& values) const noexcept;
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
   void restore(const State& state) noexcept { state_ = state; }

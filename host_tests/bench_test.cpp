@@ -305,6 +305,36 @@ TEST(Bench, GivesTheBoardBackWhenItLeaves) {
             static_cast<std::uint8_t>(control::SupervisorState::kReady));
 }
 
+// Of the board, as it is told to stop: the CNC hears why, once, and then the silence that it waits
+// for.
+TEST(Bench, HearsWhyTheBoardEndsAndNothingAfterThat) {
+  auto board = board_of(committed_scenario("bench_lathe"));
+  firmware::BoardHealth health{};
+  health.self_test_done = health.self_test_passed = health.ports_open = health.has_bus = true;
+  health.bus = {.state = hal::BusState::kActive,
+                .acknowledged = true,
+                .restarts = 0,
+                .unsent = 0,
+                .overrun = 0,
+                .error_frames = 0};
+  std::vector<Frame> last;
+  for (int k = 0; k < 1000; ++k) {
+    health.stop = k >= 500;
+    const auto out = board.tick(1'000'000'000 + k * 1'000'000, health);
+    if (!out.frame) continue;
+    board.sent();
+    if (k >= 500) last.push_back(*out.frame);
+    EXPECT_LT(k, 510) << "something after the end";
+  }
+  ASSERT_EQ(last.size(), 2U);
+  const auto emergency = hal::can::unpack<hal::can::Emergency>(last[0]);
+  ASSERT_TRUE(emergency && last[0].id == hal::can::identifier(Base::kEmergency, 1));
+  EXPECT_EQ(emergency->reason, static_cast<std::uint8_t>(control::Reason::kStopped));
+  ASSERT_EQ(last[1].id, hal::can::identifier(Base::kOverride, 1));
+  EXPECT_EQ(last[1].data[4] & 0xF, static_cast<int>(control::SupervisorState::kDead));
+  EXPECT_EQ(last[1].data[4] >> 4, static_cast<int>(control::Reason::kStopped));
+}
+
 TEST(Bench, RefusesWhatCannotBe) {
   auto config = bench_config();
   config.node = 0;

@@ -14,6 +14,7 @@
 
 #include "firmware/host/run/loop_recorder.hpp"
 #include "firmware/parameter.hpp"
+#include "support/bench_board.hpp"
 #include "support/loop_support.hpp"
 #include "support/program.hpp"
 #include "support/scratch_folder.hpp"
@@ -125,6 +126,21 @@ TEST(Golden, HoldsTheForceOverAStepInDepthBitForBit) { compare_closed_loop("demo
 
 TEST(Golden, LosesAPhaseInTheCutBitForBit) { compare_closed_loop("lost_phase", 7.0); }
 
+// The board and its bench with the frames between them; host_tests/guest/board_loop_test.py
+// compares what the service makes of the same bench over real drivers.
+TEST(Golden, HoldsTheForceThroughFramesBitForBit) {
+  const auto scenario = committed_scenario("bench_lathe");
+  auto config = bench_config();
+  config.wait_for_board = true;
+  auto bench = bench_with(scenario, config);
+  auto board = board_of(scenario);
+  BenchTogether together{.bench = bench, .board = board};
+  std::vector<LoopOutput> outputs;
+  together.sink = [&outputs](const LoopOutput& row) { outputs.push_back(row); };
+  while (bench.now_ns() <= 13'000'000'000) together.step();
+  compare("closed_loop_bench_lathe", outputs);
+}
+
 // A file that no test compares with would go stale unseen.
 TEST(Golden, HoldsNothingThatIsNotCompared) {
   if (writes()) GTEST_SKIP() << "the golden files are being written";
@@ -136,7 +152,7 @@ TEST(Golden, HoldsNothingThatIsNotCompared) {
     EXPECT_TRUE(hashes.contains(entry.path().stem().string())) << entry.path().filename();
   }
   EXPECT_EQ(traces, hashes.size());
-  EXPECT_EQ(traces, kCommittedRecordings.size() * kEstimators.size() + 2);
+  EXPECT_EQ(traces, kCommittedRecordings.size() * kEstimators.size() + 3);
 }
 
 }  // namespace

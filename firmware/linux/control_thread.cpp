@@ -40,7 +40,9 @@ class ArmedCount {
   explicit ArmedCount(Shared& shared) noexcept : shared_(shared) {}
 
   void tick(const BoardOutput& output, std::uint32_t missed) noexcept {
-    if (!armed_ && output.supervision.state < control::SupervisorState::kMonitor) return;
+    using control::SupervisorState;
+    const SupervisorState now_in = output.supervision.state;
+    if (!armed_ && (now_in < SupervisorState::kMonitor || now_in > SupervisorState::kHold)) return;
     const ThreadCounts now = thread_counts();
     if (!armed_) {
       armed_ = true;
@@ -60,6 +62,28 @@ class ArmedCount {
   std::uint64_t ticks_ = 0;
   std::uint64_t missed_ = 0;
   bool armed_ = false;
+};
+
+// Of the state, from tick to tick: within one the supervisor may take several steps, and its own
+// `changed` is of the last.
+class Changes {
+ public:
+  explicit Changes(Shared& shared) noexcept : shared_(shared) {}
+
+  void note(std::int64_t now_ns, const control::Supervisor::Output& now) noexcept {
+    if (now.state == state_ && now.reason == reason_) return;
+    state_ = now.state;
+    reason_ = now.reason;
+    shared_.changes.push({.time_ns = now_ns,
+                          .state = now.state,
+                          .reason = now.reason,
+                          .override_pct = now.override_pct});
+  }
+
+ private:
+  Shared& shared_;
+  control::SupervisorState state_ = control::SupervisorState::kBoot;
+  control::Reason reason_ = control::Reason::kNone;
 };
 
 }  // namespace
@@ -102,12 +126,12 @@ void ControlThread::run() {
                        .source = ports_.source ? &*ports_.source : nullptr});
   auto timer = hal::os::PeriodicTimer::start(settings_.tick_ns).value();
   ArmedCount armed(shared_);
+  Changes changes(shared_);
   const auto keep = [this](const LoopOutput& row) { shared_.rows.push(row); };
   BoardHealth health{};
   health.self_test_done = health.self_test_passed = health.ports_open = true;
   std::uint64_t missed = 0;
   std::uint64_t farewell = 0;
-  control::Supervisor::Output told{};  // boot, without a reason
   for (std::uint64_t tick = 1; farewell < kFarewellTicks; ++tick) {
     health.missed_ticks = timer.wait().missed;
     missed += health.missed_ticks;
@@ -115,14 +139,7 @@ void ControlThread::run() {
                   (settings_.ticks != 0 && tick > settings_.ticks);
     const std::int64_t began_ns = hal::os::monotonic_ns();
     const BoardOutput output = cycle.run(began_ns, health, keep);
-    // Against what was told, not by the step's own `changed`: one tick may be several steps.
-    if (output.supervision.state != told.state || output.supervision.reason != told.reason) {
-      told = output.supervision;
-      shared_.changes.push({.time_ns = began_ns,
-                            .state = output.supervision.state,
-                            .reason = output.supervision.reason,
-                            .override_pct = output.supervision.override_pct});
-    }
+    changes.note(began_ns, output.supervision);
     armed.tick(output, health.missed_ticks);
     const auto took_us = static_cast<std::uint32_t>((hal::os::monotonic_ns() - began_ns) / 1000);
     health.worst_loop_us = std::max(health.worst_loop_us, took_us);

@@ -158,13 +158,17 @@ int run_service(const ServiceOptions& options) {
   listen_for_signals();
   auto notifier = hal::os::ServiceNotifier::open();
   if (!notifier) return refuse(notifier.error());
-  auto ports = open_ports(files->board, files->machine, board->byte());
-  if (!ports) return refuse(ports.error());
   std::optional<hal::os::Watchdog> watchdog;
   if (const auto& wiring = files->board.watchdog) {
     auto opened = hal::os::Watchdog::open(wiring->device, static_cast<int>(wiring->timeout_s));
     if (!opened) return refuse(opened.error());
     watchdog.emplace(std::move(*opened));
+  }
+  // The lines last of all. A watchdog that cannot be stopped again then resets the machine.
+  auto ports = open_ports(files->board, files->machine, board->byte());
+  if (!ports) {
+    if (watchdog) static_cast<void>(watchdog->stop());
+    return refuse(ports.error());
   }
   // On the heap once, before anything runs: the stack of the control thread stays small.
   const auto running = std::make_unique<Board>(*board);

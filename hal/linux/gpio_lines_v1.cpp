@@ -122,6 +122,10 @@ auto GpioLines::open(const GpioConfig& config) -> std::expected<GpioLines, OpenE
   constexpr int kOut = GPIOD_LINE_REQUEST_DIRECTION_OUTPUT;
   constexpr int kIn = GPIOD_LINE_REQUEST_DIRECTION_INPUT;
   auto& i = *impl;
+  // One that somebody holds refuses all: no line is touched then.
+  for (const auto& wanted : lines_of(config)) {
+    if (const auto line = i.find(config, wanted); !line) return std::unexpected{line.error()};
+  }
   auto got = i.request(config, config.strobe, "strobe", kOut, i.strobe);
   if (got) got = i.request(config, config.alive, "alive", kOut, i.alive);
   if (got) got = i.request(config, config.alarm, "alarm", kOut, i.alarm);

@@ -66,6 +66,8 @@ struct BenchTogether {
   // Between board and bench; may change a frame, or drop it by returning false.
   std::function<bool(hal::can::Frame&, std::int64_t)> to_bench = [](hal::can::Frame&,
                                                                     std::int64_t) { return true; };
+  // Sees every row of the board's trace.
+  std::function<void(const firmware::LoopOutput&)> sink = [](const firmware::LoopOutput&) {};
   std::int64_t clock_ns = 1'000'000'000;  // the board's, of any origin
   std::uint32_t sent = 0;
 
@@ -83,7 +85,7 @@ struct BenchTogether {
     std::array<hal::can::Frame, firmware::host::Bench::kMostFrames> frames;
     const std::size_t count = bench.step(frames);
     for (std::size_t k = 0; k < count; ++k) {
-      static_cast<void>(board.receive(frames[k], clock_ns));
+      if (const auto row = board.receive(frames[k], clock_ns)) sink(*row);
     }
     const auto out = board.tick(clock_ns, {.self_test_done = true,
                                            .self_test_passed = true,
