@@ -127,6 +127,7 @@ class Supervisor {
     bool self_test_done;
     bool self_test_passed;
     bool checks_passed;          // configuration, lines and bus are as the machine file says
+    bool checks_done = true;     // false: it is too early to tell, and nothing has failed
     bool output_failed;          // byte or frame could not be handed over
     bool foreign;                // our own identifier, from another node
     bool stop;                   // the service ends: to kDead, for good

@@ -86,7 +86,8 @@ std::uint32_t Supervisor::faults(const Input& input) const noexcept {
          when(late, kLinkLate) | when(!late && !down, kLinkOk) |
          when(input.self_test_done && !input.self_test_passed, kSelfTestFails) |
          when(input.self_test_done && input.self_test_passed, kSelfTestPasses) |
-         when(!input.checks_passed, kChecksFail) | when(input.checks_passed, kChecksPass);
+         when(input.checks_done && !input.checks_passed, kChecksFail) |
+         when(input.checks_done && input.checks_passed, kChecksPass);
 }
 
 std::uint32_t Supervisor::holds(const Input& input) const noexcept {

@@ -146,6 +146,7 @@ inline constexpr auto kTransitions = std::to_array<Transition>({
     {only(SupervisorState::kCheck), kBusIsDown, SupervisorState::kCheck, Reason::kBusDown},
     {only(SupervisorState::kCheck), kLinkLate, SupervisorState::kCheck, Reason::kLinkTimeout},
     {only(SupervisorState::kCheck), kChecksPass, SupervisorState::kReady, Reason::kNone},
+    {only(SupervisorState::kCheck), kLinkOk, SupervisorState::kCheck, Reason::kNone},
 
     {only(SupervisorState::kReady), kArmEdge, SupervisorState::kMonitor, Reason::kNone},
     {only(SupervisorState::kMonitor), kControlEdge | kForceOver, SupervisorState::kMonitor,

@@ -39,8 +39,8 @@ inline constexpr std::array<ReasonText, kReasonCount> kReasonTexts{{
     {"none", "Nothing is wrong.", "Nothing is to be done."},
     {"self_test_failed", "The board's own test has failed.",
      "Read in the log which test it was; start again, and exchange the board if it stays."},
-    {"check_failed", "Configuration, lines or bus are not as the machine file says.",
-     "Run cutforce check on the machine file and mend what it names."},
+    {"check_failed", "Configuration, lines, bus or sample rate are not as the machine file says.",
+     "Compare sample_rate_hz with what the source gives, and run cutforced --check."},
     {"link_timeout", "The CNC has sent no new MachineState for longer than link_timeout_s.",
      "Check that the CNC sends every 20 ms with a running counter and the right node id; then give "
      "a new rising edge of arm."},

@@ -148,6 +148,12 @@ void Board::note_foreign() noexcept {
   }
 }
 
+// The sample rate is known after a window of it, and wrong if there is none after some.
+bool Board::checks_done() const noexcept {
+  return !own_.health.ports_open || own_.rate_hz > 0.0F ||
+         own_.now_ns - own_.began_ns > 4 * kRateWindow_ns;
+}
+
 bool Board::checks_passed() const noexcept {
   if (!own_.health.ports_open || (own_.health.has_bus && is_down(own_.health.bus))) return false;
   const float expected_hz = 1e9F / static_cast<float>(config_.sample_period_ns);
@@ -192,6 +198,7 @@ void Board::supervise(const LoopOutput* output) noexcept {
   supervision_ = supervisor_.step({.self_test_done = own_.health.self_test_done,
                                    .self_test_passed = own_.health.self_test_passed,
                                    .checks_passed = checks_passed(),
+                                   .checks_done = checks_done(),
                                    .output_failed = own_.health.output_failed,
                                    .foreign = own_.foreign_steps > 0,
                                    .stop = own_.health.stop,
@@ -238,7 +245,7 @@ auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> Boa
   own_.lost_samples += health.lost_samples;
   if (own_.started == 0) {
     own_.started = 1;
-    own_.supervised_ns = now_ns;
+    own_.supervised_ns = own_.began_ns = own_.now_ns = now_ns;
   }
   const auto step_ns = static_cast<std::int64_t>(config_.supervisor.period_s * 1e9F + 0.5F);
   if (at_once) supervise(nullptr);

@@ -109,6 +109,7 @@ class Board {
  private:
   struct Own {
     std::int64_t now_ns = 0;
+    std::int64_t began_ns = 0;       // of the first tick
     std::int64_t supervised_ns = 0;  // by the clock, of the last step
     std::int64_t rate_since_ns = 0;  // the window in which samples are counted
     std::int64_t alive_ns = 0;
@@ -136,6 +137,7 @@ class Board {
   void note_wear(const LoopOutput& output) noexcept;
   void note_turning(const hal::Sample& sample) noexcept;
   void note_foreign() noexcept;
+  [[nodiscard]] bool checks_done() const noexcept;
   [[nodiscard]] bool checks_passed() const noexcept;
   [[nodiscard]] bool stopping(const BoardHealth& health) const noexcept;
   [[nodiscard]] bool may_speak() const noexcept;

@@ -126,7 +126,7 @@ class AServedBoard(unittest.TestCase):
         self.assertEqual(
             course(frames)[-6:],
             [
-                *(("check", "check_failed"), ("ready", "none"), ("monitor", "none")),
+                *(("check", "none"), ("ready", "none"), ("monitor", "none")),
                 *(("ready", "none"), ("monitor", "none"), ("link_lost", "link_timeout")),
             ],
         )
