@@ -202,6 +202,7 @@ std::vector<Input> alphabet() {
       [](Input& i) { i.self_test_done = false; },
       [](Input& i) { i.self_test_passed = false; },
       [](Input& i) { i.checks_passed = false; },
+      [](Input& i) { i.checks_done = i.checks_passed = false; },
       [](Input& i) { i.output_failed = true; },
       [](Input& i) { i.foreign = true; },
       [](Input& i) { i.stop = true; },
