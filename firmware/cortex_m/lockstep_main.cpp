@@ -22,7 +22,7 @@ namespace {
 using namespace hal::cortex_m;
 using hal::LockstepRecord;
 
-using Can = LockstepCan<MappedRegisters>;
+using Can = LockstepCan<MappedRegisters, MappedRegisters>;
 using Source = AdcSource<1>;
 struct NoWait {
   void operator()(std::uint32_t) const noexcept {}
@@ -58,7 +58,7 @@ MadeBoard* make_from(Can& can) {
 }
 
 int run_lockstep() {
-  static Can can{MappedRegisters{kBoard.uart}};
+  static Can can{MappedRegisters{kBoard.uart}, kSystemControl, kBoard.uart_interrupt};
   can.start(kDivider);
   MadeBoard* const made = make_from(can);
   if (made == nullptr || !*made) {

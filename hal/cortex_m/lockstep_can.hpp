@@ -1,5 +1,6 @@
 // The board's CAN port where the bus is a UART in lockstep (hal/lockstep_frames.hpp): frames wait
-// here until the tick that they belong to.
+// here until the tick that they belong to. Until a byte comes the processor sleeps: one that asks
+// again and again leaves QEMU little time to bring it.
 #pragma once
 
 #include <algorithm>
@@ -17,16 +18,22 @@
 
 namespace cutforce::hal::cortex_m {
 
-template <RegisterBlock R>
+// `R` are the UART's registers, `S` those of the core.
+template <RegisterBlock R, RegisterBlock S>
 class LockstepCan {
  public:
   static constexpr std::size_t kMostFrames = 8;
 
-  explicit LockstepCan(R registers) noexcept : uart_(registers) {}
+  LockstepCan(R uart, S system, std::uint32_t interrupt) noexcept
+      : uart_(uart), system_(system), interrupt_(interrupt) {}
 
   // `divider` as CmsdkUart::start().
   void start(std::uint32_t divider) noexcept {
     uart_.start(divider);
+    // It wakes the processor and is never served.
+    asm volatile("cpsid i" ::: "memory");
+    system_.store(kInterruptEnable + 4 * (interrupt_ / 32), 1U << interrupt_ % 32);
+    uart_.call_on_receive();
     tell(LockstepRecord::kListening);
   }
 
@@ -88,14 +95,20 @@ class LockstepCan {
  private:
   [[nodiscard]] std::uint8_t get() noexcept {
     for (;;) {
+      // In this order: what comes after the question wakes from the sleep.
+      uart_.quiet();
+      system_.store(kInterruptClearPending + 4 * (interrupt_ / 32), 1U << interrupt_ % 32);
       if (const auto byte = uart_.receive()) return *byte;
+      asm volatile("wfi" ::: "memory");
     }
   }
 
   CmsdkUart<R> uart_;
+  S system_;
+  std::uint32_t interrupt_;
   std::array<can::Frame, kMostFrames> frames_{};
   std::size_t count_ = 0;
 };
-static_assert(CanPort<LockstepCan<MappedRegisters>>);
+static_assert(CanPort<LockstepCan<MappedRegisters, MappedRegisters>>);
 
 }  // namespace cutforce::hal::cortex_m

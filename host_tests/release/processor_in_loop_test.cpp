@@ -3,13 +3,12 @@
 // answers, frame by frame, and so is the override that the CNC runs. Skipped, visibly, where the
 // cross compiler, the emulator or the image are missing.
 //
-//   CUTFORCE_LOOP_S=13 build/release/host_tests/release/cutforce_release_tests
-//       --gtest_filter='ProcessorInLoop.*'        the whole cut; without, the entry alone, 5 s
+//   cmake --build --preset cortex-m && cmake --build --preset host-release
+//   build/release/host_tests/release/cutforce_release_tests --gtest_filter='ProcessorInLoop.*'
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -84,17 +83,13 @@ Ran run(const firmware::host::Scenario& scenario, Device& board, double duration
   return ran;
 }
 
-double duration_s() {
-  const char* const wanted = std::getenv("CUTFORCE_LOOP_S");
-  constexpr double kIntoTheCut_s = 5.0;
-  return wanted == nullptr ? kIntoTheCut_s : std::stod(wanted);
-}
+constexpr double kDuration_s = 13.0;  // the whole cut
 
-TEST(ProcessorInLoop, GivesTheFramesAndTheOverrideOfTheHostIntoTheCut) {
+TEST(ProcessorInLoop, GivesTheFramesAndTheOverrideOfTheHostThroughTheCut) {
   if (const auto what = missing(); !what.empty()) GTEST_SKIP() << what;
   const auto scenario = committed_scenario("bench_lathe");
   auto board = board_of(scenario);
-  const Ran wanted = run(scenario, board, duration_s());
+  const Ran wanted = run(scenario, board, kDuration_s);
 
   const ScratchFolder folder;
   const auto path = folder.file("uart");
@@ -103,7 +98,7 @@ TEST(ProcessorInLoop, GivesTheFramesAndTheOverrideOfTheHostIntoTheCut) {
   socket.accept();
   const auto scale = firmware::host::full_scale_of(scenario);
   LockstepBoard guest(socket, machine_of(scenario), 1, scale.voltage_v, scale.current_a);
-  const Ran got = run(scenario, guest, duration_s());
+  const Ran got = run(scenario, guest, kDuration_s);
   guest.end();
 
   EXPECT_EQ(emulated.status(), 0);
