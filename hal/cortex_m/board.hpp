@@ -12,6 +12,7 @@ struct Board {
   std::string_view name;
   std::uintptr_t timer;
   std::uintptr_t uart;
+  std::uint32_t uart_interrupt;  // of a received character, its number at the core
   std::uintptr_t watchdog;
   std::uintptr_t pins;  // of the override byte
   std::uint32_t clock_hz;
@@ -20,18 +21,21 @@ struct Board {
 inline constexpr Board kAn500{.name = "mps2-an500",
                               .timer = 0x40000000,
                               .uart = 0x40004000,
+                              .uart_interrupt = 0,
                               .watchdog = 0x40008000,
                               .pins = 0x40010000,
                               .clock_hz = 25'000'000};
 inline constexpr Board kAn386{.name = "mps2-an386",
                               .timer = 0x40000000,
                               .uart = 0x40004000,
+                              .uart_interrupt = 0,
                               .watchdog = 0x40008000,
                               .pins = 0x40010000,
                               .clock_hz = 25'000'000};
 inline constexpr Board kAn505{.name = "mps2-an505",
                               .timer = 0x50000000,
                               .uart = 0x50200000,
+                              .uart_interrupt = 33,
                               .watchdog = 0x50081000,
                               .pins = 0x50100000,
                               .clock_hz = 20'000'000};

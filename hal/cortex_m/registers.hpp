@@ -40,6 +40,8 @@ inline constexpr MappedRegisters kSystemControl{0xE000E000U};
 inline constexpr std::size_t kSysTickControl = 0x010;
 inline constexpr std::size_t kSysTickReload = 0x014;
 inline constexpr std::size_t kSysTickValue = 0x018;
+inline constexpr std::size_t kInterruptEnable = 0x100;        // NVIC_ISER0; a bit each
+inline constexpr std::size_t kInterruptClearPending = 0x280;  // NVIC_ICPR0
 inline constexpr std::size_t kCpuid = 0xD00;
 inline constexpr std::size_t kConfigurationControl = 0xD14;
 inline constexpr std::size_t kHandlerControl = 0xD24;

@@ -23,6 +23,12 @@ class CmsdkUart {
     static_cast<void>(registers_.load(kData));
   }
 
+  // From now on a character that has come asks for an interrupt, until quiet().
+  void call_on_receive() noexcept {
+    registers_.store(kControl, kTransmit | kReceive | kReceiveInterrupt);
+  }
+  void quiet() noexcept { registers_.store(kInterrupt, kReceivePending); }
+
   void send(char character) noexcept {
     while ((registers_.load(kState) & kTransmitFull) != 0) {
     }
@@ -42,11 +48,14 @@ class CmsdkUart {
   static constexpr std::size_t kData = 0x00;
   static constexpr std::size_t kState = 0x04;
   static constexpr std::size_t kControl = 0x08;
+  static constexpr std::size_t kInterrupt = 0x0C;
   static constexpr std::size_t kDivider = 0x10;
   static constexpr std::uint32_t kTransmitFull = 1U << 0;
   static constexpr std::uint32_t kReceiveFull = 1U << 1;
   static constexpr std::uint32_t kTransmit = 1U << 0;
   static constexpr std::uint32_t kReceive = 1U << 1;
+  static constexpr std::uint32_t kReceiveInterrupt = 1U << 3;
+  static constexpr std::uint32_t kReceivePending = 1U << 1;
 
   R registers_;
 };

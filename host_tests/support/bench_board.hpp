@@ -45,23 +45,29 @@ namespace cutforce::host_tests {
 }
 
 // The machine as the file beside the scenario would have it, in the mode that takes control.
-[[nodiscard]] inline firmware::Board board_of(const firmware::host::Scenario& scenario,
-                                              std::uint8_t node = 1) {
+[[nodiscard]] inline firmware::Machine machine_of(const firmware::host::Scenario& scenario) {
   firmware::Machine machine = scenario.machine;
   machine.supervisor_mode = firmware::SupervisorMode::kControl;
+  return machine;
+}
+
+[[nodiscard]] inline firmware::Board board_of(const firmware::host::Scenario& scenario,
+                                              std::uint8_t node = 1) {
   const auto scale = firmware::host::full_scale_of(scenario);
-  return firmware::make_board(machine, {.node = node,
-                                        .samples_by_can = true,
-                                        .voltage_full_scale_v = scale.voltage_v,
-                                        .current_full_scale_a = scale.current_a})
+  return firmware::make_board(machine_of(scenario), {.node = node,
+                                                     .samples_by_can = true,
+                                                     .voltage_full_scale_v = scale.voltage_v,
+                                                     .current_full_scale_a = scale.current_a})
       .value();
 }
 
 // Runs board and bench, sample by sample. The board is awake `delay()` after each sample has been
-// sent, in whole nanoseconds below the CNC's scan; what it sends is there when it comes.
-struct BenchTogether {
+// sent, in whole nanoseconds below the CNC's scan; what it sends is there when it comes. `Device`
+// is the board itself, or what stands for one elsewhere.
+template <class Device>
+struct BenchBeside {
   firmware::host::Bench& bench;
-  firmware::Board& board;
+  Device& board;
   std::function<std::int64_t()> delay_ns = [] { return 300'000; };
   // Between board and bench; may change a frame, or drop it by returning false.
   std::function<bool(hal::can::Frame&, std::int64_t)> to_bench = [](hal::can::Frame&,
@@ -114,5 +120,6 @@ struct BenchTogether {
     clock_ns += bench.period_ns();
   }
 };
+using BenchTogether = BenchBeside<firmware::Board>;
 
 }  // namespace cutforce::host_tests
