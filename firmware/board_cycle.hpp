@@ -31,6 +31,8 @@ class BoardCycle {
   static constexpr std::size_t kSamplesATick = 64;
   // Lines that fail for so many ticks in a row are given up; one refusal may be a signal's doing.
   static constexpr std::uint32_t kFailuresInRow = 3;
+  // So is a receiver that answers no strobe: a PLC's scan and its input filters are within this.
+  static constexpr std::uint32_t kUnansweredInRow = 200;
 
   BoardCycle(Board& board, BoardPorts<Can, Bytes, Source> ports) noexcept
       : board_(board), ports_(ports) {}
@@ -44,8 +46,8 @@ class BoardCycle {
     health.has_bus = ports_.can != nullptr;
     if (ports_.can != nullptr) health.bus = bus_ = ports_.can->status();
     health.lines = lines_;
-    health.output_failed = health.output_failed || byte_failures_ >= kFailuresInRow ||
-                           source_failures_ >= kFailuresInRow;
+    health.output_failed =
+        health.output_failed || byte_failures_ >= kFailuresInRow || unanswered_ >= kUnansweredInRow;
     const BoardOutput output = board_.tick(now_ns, health);
     write(output);
     return output;
@@ -79,11 +81,7 @@ class BoardCycle {
       return 0;
     }
     const auto reading = ports_.source->read(samples_);
-    if (!reading) {
-      ++source_failures_;
-      return 0;
-    }
-    source_failures_ = 0;
+    if (!reading) return 0;  // samples that stay away are told by their absence
     ++sample_passes_;
     for (const hal::Sample& sample : std::span(samples_).first(reading->count)) {
       if (const auto row = board_.sample(sample, now_ns)) sink(*row);
@@ -96,6 +94,7 @@ class BoardCycle {
       if (const auto lines = ports_.bytes->write(output.byte)) {
         lines_ = *lines;
         byte_failures_ = 0;
+        unanswered_ = lines_.acknowledged ? 0 : unanswered_ + 1;
       } else {
         ++byte_failures_;
       }
@@ -113,7 +112,7 @@ class BoardCycle {
   std::uint64_t bus_passes_ = 0;
   std::uint64_t sample_passes_ = 0;
   std::uint32_t byte_failures_ = 0;
-  std::uint32_t source_failures_ = 0;
+  std::uint32_t unanswered_ = 0;
 };
 
 }  // namespace cutforce::firmware
