@@ -141,6 +141,10 @@ class BasicControlPath {
     if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
     return BasicControlPath{config};
   }
+  // Of a config that check() accepts, made where it stays.
+  [[nodiscard]] static constexpr BasicControlPath make_checked(const Config& config) noexcept {
+    return BasicControlPath{config};
+  }
 
   [[nodiscard]] constexpr Output step(const Input& input) noexcept {
     const auto force = force_input_.step({.force_n = input.force_n,
@@ -224,6 +228,15 @@ class BasicControlPath {
     bool controlling;
   };
 
+  // A set of laws is too large to be copied from an expected one.
+  [[nodiscard]] static constexpr L checked_law(const typename L::Config& config) noexcept {
+    if constexpr (requires { L::make_checked(config); }) {
+      return L::make_checked(config);
+    } else {
+      return *L::make(config);
+    }
+  }
+
   // config has passed check(): every part can be made.
   explicit constexpr BasicControlPath(const Config& config) noexcept
       : force_reference_n_(config.force_reference_n),
@@ -235,7 +248,7 @@ class BasicControlPath {
         highest_n_(config.force_input.highest_n),
         force_input_(*ForceInput::make(config.force_input)),
         cut_state_(*CutState::make(config.cut_state)),
-        law_(*L::make(config.law)),
+        law_(checked_law(config.law)),
         feed_override_(*FeedOverride::make(config.feed_override)),
         applied_override_(*AppliedOverride::make(config.applied_override)) {}
 

@@ -118,6 +118,10 @@ class GainTracker {
 
   // Fails iff check() does.
   [[nodiscard]] static std::expected<GainTracker, ConfigError> make(const Config& config) noexcept;
+  // Of a config that check() accepts, made where it stays.
+  [[nodiscard]] static GainTracker make_checked(const Config& config) noexcept {
+    return GainTracker{config};
+  }
 
   [[nodiscard]] Output step(const Input& input) noexcept;
   // The feed goes on, the reading is not to be learned from.

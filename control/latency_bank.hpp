@@ -72,6 +72,10 @@ class LatencyBank {
 
   // Fails iff check() does.
   [[nodiscard]] static std::expected<LatencyBank, ConfigError> make(const Config& config) noexcept;
+  // Of a config that check() accepts, made where it stays.
+  [[nodiscard]] static LatencyBank make_checked(const Config& config) noexcept {
+    return LatencyBank{config};
+  }
   [[nodiscard]] Output step(const Input& input) noexcept;
 
   [[nodiscard]] const State& state() const noexcept { return state_; }

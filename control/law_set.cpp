@@ -26,6 +26,16 @@ auto LawSet::visit(Set& set, const Visitor& visitor) {
   return visitor(set.pi_, set.config_.pi);
 }
 
+namespace {
+
+// Apart, so that the copy is not on the stack below a step of the deepest law.
+template <class L>
+[[gnu::noinline]] void start_anew(L& law, const typename L::Config& config) noexcept {
+  law = *L::make(config);
+}
+
+}  // namespace
+
 auto LawSet::Config::check() const noexcept -> std::expected<void, ConfigError> {
   const auto fail = [](ConfigError error) { return std::unexpected{error}; };
   if (static_cast<std::size_t>(in_charge) >= kLawCount) return fail(ConfigError::kInCharge);
@@ -51,7 +61,7 @@ LawSet::LawSet(const Config& config) noexcept
       mrac_(*Mrac::make(config.mrac)),
       variable_gain_(*VariableGain::make(config.variable_gain)),
       fuzzy_(*FuzzyPi::make(config.fuzzy)),
-      predictive_(*Predictive::make(config.predictive)),
+      predictive_(Predictive::make_checked(config.predictive)),
       in_charge_(config.in_charge) {}
 
 auto LawSet::make(const Config& config) noexcept -> std::expected<LawSet, ConfigError> {
@@ -74,7 +84,7 @@ void LawSet::join(const Input& input) noexcept {
     if constexpr (requires { law.rejoin(); }) {
       law.rejoin();
     } else {
-      law = *std::remove_cvref_t<decltype(law)>::make(config);
+      start_anew(law, config);
     }
     for (int k = 0; k < kCatchUpTicks; ++k) std::ignore = law.step(still);
   });

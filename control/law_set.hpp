@@ -87,6 +87,8 @@ class LawSet {
 
   // Fails iff check() does.
   [[nodiscard]] static std::expected<LawSet, ConfigError> make(const Config& config) noexcept;
+  // Of a config that check() accepts, made where it stays.
+  [[nodiscard]] static LawSet make_checked(const Config& config) noexcept { return LawSet{config}; }
 
   [[nodiscard]] Output step(const Input& input) noexcept;
 

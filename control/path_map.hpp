@@ -91,6 +91,10 @@ class PathMap {
     if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
     return PathMap{config};
   }
+  // Of a config that check() accepts, made where it stays.
+  [[nodiscard]] static PathMap make_checked(const Config& config) noexcept {
+    return PathMap{config};
+  }
 
   // A part begins: what the last one taught is kept.
   void start() noexcept;

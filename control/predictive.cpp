@@ -27,6 +27,33 @@ LagStep lag_step(const Predictive::Config& config, float length_s) noexcept {
   return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
 }
 
+constexpr GainTracker::Config tracker_config(const Predictive::Config& config) noexcept {
+  return {.period_s = config.period_s,
+          .cut_lag_s = config.process_lag_s,
+          .sensor_lag_s = config.sensor_lag_s,
+          .gain_n = config.process_gain_n,
+          .noise_ratio = config.noise_ratio,
+          .noise_n = config.noise_n,
+          .jump_threshold = config.jump_threshold};
+}
+
+constexpr PathMap::Config map_config(const Predictive::Config& config) noexcept {
+  return {.period_s = config.period_s,
+          .feed_lag_s = config.feed_lag_s,
+          .sensor_lag_s = config.sensor_lag_s,
+          .feed_exponent = config.feed_exponent,
+          .gain_n = config.process_gain_n};
+}
+
+constexpr LatencyBank::Config bank_config(const Predictive::Config& config) noexcept {
+  return {.period_s = config.period_s,
+          .latency_s = config.latency_s,
+          .most_latency_s = std::min(kLongestLatency_s, kMostTicks * config.period_s),
+          .feed_lag_s = config.feed_lag_s,
+          .cut_lag_s = config.process_lag_s,
+          .sensor_lag_s = config.sensor_lag_s};
+}
+
 }  // namespace
 
 std::expected<void, Predictive::ConfigError> Predictive::Config::check() const noexcept {
@@ -56,37 +83,17 @@ std::expected<void, Predictive::ConfigError> Predictive::Config::check() const n
 
 auto Predictive::make(const Config& config) noexcept -> std::expected<Predictive, ConfigError> {
   if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  const auto tracker = GainTracker::make({.period_s = config.period_s,
-                                          .cut_lag_s = config.process_lag_s,
-                                          .sensor_lag_s = config.sensor_lag_s,
-                                          .gain_n = config.process_gain_n,
-                                          .noise_ratio = config.noise_ratio,
-                                          .noise_n = config.noise_n,
-                                          .jump_threshold = config.jump_threshold});
-  if (!tracker) return std::unexpected{ConfigError::kGain};
-  const auto map = PathMap::make({.period_s = config.period_s,
-                                  .feed_lag_s = config.feed_lag_s,
-                                  .sensor_lag_s = config.sensor_lag_s,
-                                  .feed_exponent = config.feed_exponent,
-                                  .gain_n = config.process_gain_n});
-  if (!map) return std::unexpected{ConfigError::kGain};
-  const auto bank = LatencyBank::make(
-      {.period_s = config.period_s,
-       .latency_s = config.latency_s,
-       .most_latency_s = std::min(kLongestLatency_s, kMostTicks * config.period_s),
-       .feed_lag_s = config.feed_lag_s,
-       .cut_lag_s = config.process_lag_s,
-       .sensor_lag_s = config.sensor_lag_s});
-  if (!bank) return std::unexpected{ConfigError::kLatency};
-  return Predictive{config, *tracker, *map, *bank};
+  if (!tracker_config(config).check() || !map_config(config).check())
+    return std::unexpected{ConfigError::kGain};
+  if (!bank_config(config).check()) return std::unexpected{ConfigError::kLatency};
+  return Predictive{config};
 }
 
-Predictive::Predictive(const Config& config, const GainTracker& tracker, const PathMap& map,
-                       const LatencyBank& bank) noexcept
+Predictive::Predictive(const Config& config) noexcept
     : config_(config),
-      tracker_(tracker),
-      map_(map),
-      bank_(bank),
+      tracker_(GainTracker::make_checked(tracker_config(config))),
+      map_(PathMap::make_checked(map_config(config))),
+      bank_(LatencyBank::make_checked(bank_config(config))),
       tick_(lag_step(config, config.period_s)),
       inverse_exponent_(1.0F / config.feed_exponent),
       forgets_ratio_(exp_bounded(-config.recovery_1_s * config.period_s)),

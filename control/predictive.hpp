@@ -99,6 +99,10 @@ class Predictive {
 
   // Fails iff check() does.
   [[nodiscard]] static std::expected<Predictive, ConfigError> make(const Config& config) noexcept;
+  // Of a config that make() accepts, made where it stays: 5 kB do not pass over a stack.
+  [[nodiscard]] static Predictive make_checked(const Config& config) noexcept {
+    return Predictive{config};
+  }
 
   [[nodiscard]] Output step(const Input& input) noexcept;
   // In charge again after another law: what was learned of parts and of the dead time stays, but
@@ -109,8 +113,7 @@ class Predictive {
   void restore(const State& state) noexcept;
 
  private:
-  Predictive(const Config& config, const GainTracker& tracker, const PathMap& map,
-             const LatencyBank& bank) noexcept;
+  explicit Predictive(const Config& config) noexcept;
 
   struct Forecast {
     float force_n;  // at the end of the dead time

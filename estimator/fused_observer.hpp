@@ -141,6 +141,10 @@ class FusedObserver {
 
   [[nodiscard]] static std::expected<FusedObserver, ConfigError> make(
       const Config& config) noexcept;
+  // Of a config that check() accepts, made where it stays.
+  [[nodiscard]] static FusedObserver make_checked(const Config& config) noexcept {
+    return FusedObserver{config};
+  }
 
   void step(const Sample& sample) noexcept {
     step(sample.motor, sample.elapsed_periods);

@@ -144,6 +144,10 @@ class SignalHealth {
   };
 
   [[nodiscard]] static std::expected<SignalHealth, ConfigError> make(const Config& config) noexcept;
+  // Of a config that check() accepts, made where it stays.
+  [[nodiscard]] static SignalHealth make_checked(const Config& config) noexcept {
+    return SignalHealth{config};
+  }
 
   // Every sample that passed the gate; in two parts, so that a sample need not be made an
   // observation that nobody looks at.

@@ -130,6 +130,10 @@ class TorquePath {
 
   // Fails iff check() does.
   [[nodiscard]] static std::expected<TorquePath, ConfigError> make(const Config& config) noexcept;
+  // Of a config that check() accepts, made where it stays.
+  [[nodiscard]] static TorquePath make_checked(const Config& config) noexcept {
+    return TorquePath{config};
+  }
 
   // One raw sample; an output with the last sample of each window.
   [[nodiscard]] std::optional<Output> step(const Input& input) noexcept {
@@ -160,8 +164,7 @@ class TorquePath {
   struct Estimate;  // one torque with its share of the uncertainty
   struct Load;      // what inertia and friction take
 
-  TorquePath(const Config& config, const Blocks& blocks) noexcept
-      : config_(config), blocks_(blocks) {}
+  explicit TorquePath(const Config& config) noexcept;
 
   [[nodiscard]] Window window(const AirGapPower::Output& power,
                               const SynchronousSpeed::Output& synchronous) noexcept;

@@ -31,8 +31,14 @@ hal::Sample with_third_phase(hal::Sample sample) noexcept {
 }  // namespace
 
 Board::Board(const Config& config) noexcept
-    : config_(config),
-      loop_(*ControlLoop::make(config.loop)),
+    : config_{.samples_by_can = config.samples_by_can,
+              .node = config.node,
+              .code = config.loop.controller.code,
+              .supervisor_period_s = config.supervisor.period_s,
+              .force_reference_n = config.force_reference_n,
+              .force_limit_n = config.force_limit_n,
+              .sample_period_ns = config.sample_period_ns},
+      loop_(ControlLoop::make_checked(config.loop)),
       supervisor_(*Supervisor::make(config.supervisor)),
       assembler_(*hal::can::SampleAssembler::make(config.assembler)),
       link_(config.node),
@@ -40,16 +46,19 @@ Board::Board(const Config& config) noexcept
   supervision_.override_pct = loop_.command().override_pct;
 }
 
-auto Board::make(const Config& config) noexcept -> std::expected<Board, ConfigError> {
-  if (!ControlLoop::make(config.loop)) return std::unexpected{ConfigError::kLoop};
-  if (!config.supervisor.check()) return std::unexpected{ConfigError::kSupervisor};
-  if (!config.assembler.check() || config.sample_period_ns <= 0)
-    return std::unexpected{ConfigError::kAssembler};
-  if (config.node < 1 || config.node > 127) return std::unexpected{ConfigError::kNode};
-  const bool limited = config.force_limit_n > 0.0F;
-  if (!(config.force_limit_n >= 0.0F) ||
-      (limited && !(config.force_limit_n > config.force_reference_n)))
+auto Board::Config::check() const noexcept -> std::expected<void, ConfigError> {
+  if (!loop.check()) return std::unexpected{ConfigError::kLoop};
+  if (!supervisor.check()) return std::unexpected{ConfigError::kSupervisor};
+  if (!assembler.check() || sample_period_ns <= 0) return std::unexpected{ConfigError::kAssembler};
+  if (node < 1 || node > 127) return std::unexpected{ConfigError::kNode};
+  const bool limited = force_limit_n > 0.0F;
+  if (!(force_limit_n >= 0.0F) || (limited && !(force_limit_n > force_reference_n)))
     return std::unexpected{ConfigError::kForceLimit};
+  return {};
+}
+
+auto Board::make(const Config& config) noexcept -> std::expected<Board, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
   return Board{config};
 }
 
@@ -247,7 +256,7 @@ auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> Boa
     own_.started = 1;
     own_.supervised_ns = own_.began_ns = own_.now_ns = now_ns;
   }
-  const auto step_ns = static_cast<std::int64_t>(config_.supervisor.period_s * 1e9F + 0.5F);
+  const auto step_ns = static_cast<std::int64_t>(config_.supervisor_period_s * 1e9F + 0.5F);
   if (at_once) supervise(nullptr);
   if (now_ns - own_.supervised_ns > kSilence_ns) {
     std::int64_t steps = (now_ns - own_.supervised_ns - kSilence_ns) / step_ns;

@@ -60,10 +60,11 @@ class Board {
     hal::can::SampleAssembler::Config assembler;
     bool samples_by_can;
     std::uint8_t node;  // 1..127
-    control::OverrideCode code;
     float force_reference_n;
     float force_limit_n;  // above the reference; 0: none
     std::int64_t sample_period_ns;
+
+    [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
   };
 
   // Without a sample for so long, the clock goes on for them.
@@ -72,9 +73,11 @@ class Board {
   // Another node with our identifiers is there for so long after its last frame: ten heartbeats.
   static constexpr float kForeignMemory_s = 1.0F;
 
-  // Fails iff a part refuses its config, the node is not 1..127, or the limit is not above the
-  // reference.
+  // Fails iff check() does: a part refuses its config, the node is not 1..127, or the limit is not
+  // above the reference.
   [[nodiscard]] static std::expected<Board, ConfigError> make(const Config& config) noexcept;
+  // Of a config that check() accepts, made where it stays: 10 kB do not pass over a small stack.
+  [[nodiscard]] static Board make_checked(const Config& config) noexcept { return Board{config}; }
 
   // On a bus where nobody answers, nothing is heard of the board either.
   [[nodiscard]] static constexpr bool is_down(const hal::BusStatus& bus) noexcept {
@@ -145,7 +148,18 @@ class Board {
   [[nodiscard]] float force_limit_n() const noexcept;
   [[nodiscard]] BoardValues values() const noexcept;
 
-  Config config_;
+  // What is left to read of the configuration once the parts are made.
+  struct Settings {
+    bool samples_by_can;
+    std::uint8_t node;
+    control::OverrideCode code;
+    float supervisor_period_s;
+    float force_reference_n;
+    float force_limit_n;
+    std::int64_t sample_period_ns;
+  };
+
+  Settings config_;
   ControlLoop loop_;
   control::Supervisor supervisor_;
   hal::can::SampleAssembler assembler_;

@@ -23,12 +23,12 @@ struct BoardPorts {
   Source* source = nullptr;
 };
 
-template <hal::CanPort Can, hal::BytePort Bytes, hal::SampleSource Source>
+// Three frames come in a millisecond at 1 kHz from the acquisition node and the CNC; the rest of a
+// tick's frames and samples is for catching up, which a small target has no memory for.
+template <hal::CanPort Can, hal::BytePort Bytes, hal::SampleSource Source,
+          std::size_t kFramesATick = 32, std::size_t kSamplesATick = 64>
 class BoardCycle {
  public:
-  // Three a millisecond at 1 kHz from the acquisition node and the CNC; the rest is catching up.
-  static constexpr std::size_t kFramesATick = 32;
-  static constexpr std::size_t kSamplesATick = 64;
   // Lines that fail for so many ticks in a row are given up; one refusal may be a signal's doing.
   static constexpr std::uint32_t kFailuresInRow = 3;
   // So is a receiver that answers no strobe: a PLC's scan and its input filters are within this.

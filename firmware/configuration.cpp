@@ -275,13 +275,16 @@ estimator::TorquePath::Config torque_path(const Machine& m, const Derived& d) no
 
 }  // namespace
 
-std::expected<ControlLoop::Config, ConfigurationError> make_loop_config(const Machine& m) noexcept {
-  const auto derived = derive(m);
-  if (!derived) return std::unexpected{derived.error()};
-  const Derived& d = *derived;
+std::expected<void, ConfigurationError> check_loop(const Machine& m) noexcept {
+  if (const auto derived = derive(m); !derived) return std::unexpected{derived.error()};
+  return {};
+}
+
+ControlLoop::Config loop_config(const Machine& m) noexcept {
+  const Derived d = *derive(m);
   const Derived motor = for_motor(m, d);
   const std::uint32_t samples = d.samples_per_estimate * d.estimates_per_control;
-  return ControlLoop::Config{
+  return {
       .estimator = m.estimator,
       .control = m.controller != ControllerName::kNone,
       .current_w_present = m.current_w_present,
@@ -311,6 +314,11 @@ std::expected<ControlLoop::Config, ConfigurationError> make_loop_config(const Ma
                 .minimum_speed_rad_s = m.minimum_speed_rad_s,
                 .diameter_sigma_m = 0.0F},
       .controller = control_path_config(m, d.sample_period_s * static_cast<float>(samples))};
+}
+
+std::expected<ControlLoop::Config, ConfigurationError> make_loop_config(const Machine& m) noexcept {
+  if (const auto checked = check_loop(m); !checked) return std::unexpected{checked.error()};
+  return loop_config(m);
 }
 
 std::expected<ControlLoop, ConfigurationFailure> make_loop(const Machine& machine) noexcept {

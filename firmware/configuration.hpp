@@ -27,6 +27,11 @@ struct ConfigurationFailure {
 [[nodiscard]] std::expected<ControlLoop::Config, ConfigurationError> make_loop_config(
     const Machine& machine) noexcept;
 
+// The two steps of make_loop_config, for a stack that has no room for a second copy: whether there
+// is an answer, and the answer.
+[[nodiscard]] std::expected<void, ConfigurationError> check_loop(const Machine& machine) noexcept;
+[[nodiscard]] ControlLoop::Config loop_config(const Machine& machine) noexcept;
+
 // `machine` must be complete (complete_from_rating) and pass check(Machine).
 [[nodiscard]] std::expected<ControlLoop, ConfigurationFailure> make_loop(
     const Machine& machine) noexcept;

@@ -11,38 +11,39 @@ std::int64_t nanoseconds(float period_s) noexcept {
 
 }  // namespace
 
+Board::Config board_config(const Machine& machine, const BoardWiring& wiring) noexcept {
+  const std::int64_t sample_period_ns = nanoseconds(1.0F / machine.sample_rate_hz);
+  return {.loop = loop_config(machine),
+          .supervisor = make_supervisor_config(machine),
+          .assembler = {.period_ns = sample_period_ns,
+                        .voltage_full_scale_v = wiring.voltage_full_scale_v,
+                        .current_full_scale_a = wiring.current_full_scale_a},
+          .samples_by_can = wiring.samples_by_can,
+          .node = wiring.node,
+          .force_reference_n = machine.force_reference_n,
+          .force_limit_n = machine.force_limit_n,
+          .sample_period_ns = sample_period_ns};
+}
+
 auto make_board(const Machine& machine, const BoardWiring& wiring) noexcept
     -> std::expected<Board, BoardFailure> {
   BoardFailure failure{};
   failure.what = BoardFailure::What::kLoop;
-  const auto loop = make_loop_config(machine);
-  if (!loop) {
-    failure.loop.error = loop.error();
+  if (const auto checked = check_loop(machine); !checked) {
+    failure.loop.error = checked.error();
     return std::unexpected{failure};
   }
-  if (const auto made = ControlLoop::make(*loop); !made) {
-    failure.loop = {.error = ConfigurationError::kBlock, .block = made.error()};
+  const Board::Config config = board_config(machine, wiring);
+  if (const auto checked = config.loop.check(); !checked) {
+    failure.loop = {.error = ConfigurationError::kBlock, .block = checked.error()};
     return std::unexpected{failure};
   }
-  const std::int64_t sample_period_ns = nanoseconds(1.0F / machine.sample_rate_hz);
-  const auto board =
-      Board::make({.loop = *loop,
-                   .supervisor = make_supervisor_config(machine),
-                   .assembler = {.period_ns = sample_period_ns,
-                                 .voltage_full_scale_v = wiring.voltage_full_scale_v,
-                                 .current_full_scale_a = wiring.current_full_scale_a},
-                   .samples_by_can = wiring.samples_by_can,
-                   .node = wiring.node,
-                   .code = loop->controller.code,
-                   .force_reference_n = machine.force_reference_n,
-                   .force_limit_n = machine.force_limit_n,
-                   .sample_period_ns = sample_period_ns});
-  if (!board) {
+  if (const auto checked = config.check(); !checked) {
     failure.what = BoardFailure::What::kBoard;
-    failure.board = board.error();
+    failure.board = checked.error();
     return std::unexpected{failure};
   }
-  return *board;
+  return Board::make_checked(config);
 }
 
 }  // namespace cutforce::firmware

@@ -27,4 +27,9 @@ struct BoardFailure {
 [[nodiscard]] std::expected<Board, BoardFailure> make_board(const Machine& machine,
                                                             const BoardWiring& wiring) noexcept;
 
+// The config of a machine that check_loop() accepts; its own check() is still to be asked. For a
+// target that makes the board where it stays.
+[[nodiscard]] Board::Config board_config(const Machine& machine,
+                                         const BoardWiring& wiring) noexcept;
+
 }  // namespace cutforce::firmware

@@ -28,13 +28,13 @@ ControlLoop::ControlLoop(const Config& config) noexcept
               .path_pole_pairs = config.path.synchronous.pole_pairs},
       gate_(*SampleGate::make(config.gate)),
       front_end_(*estimator::FrontEnd::make(config.front_end)),
-      fused_(*estimator::FusedObserver::make(config.fused)),
-      health_(*estimator::SignalHealth::make(config.health)),
+      fused_(estimator::FusedObserver::make_checked(config.fused)),
+      health_(estimator::SignalHealth::make_checked(config.health)),
       calibration_(*estimator::IdleCalibration::make(config.calibration)),
-      path_(*estimator::TorquePath::make(config.path)),
+      path_(estimator::TorquePath::make_checked(config.path)),
       load_friction_(*estimator::LoadFriction::make(config.load_friction)),
       force_(*estimator::CuttingForce::make(config.force)),
-      controller_(*control::ControlPath::make(config.controller)) {
+      controller_(control::ControlPath::make_checked(config.controller)) {
   own_.diameter_m = config.fixed_diameter_m;
   const auto neutral =
       static_cast<std::uint8_t>(config.controller.feed_override.initial_pct + 0.5F);
@@ -44,20 +44,25 @@ ControlLoop::ControlLoop(const Config& config) noexcept
               .controlling = false};
 }
 
-auto ControlLoop::make(const Config& config) noexcept -> std::expected<ControlLoop, ConfigError> {
+auto ControlLoop::Config::check() const noexcept -> std::expected<void, ConfigError> {
   const auto fail = [](ConfigError error) { return std::unexpected{error}; };
-  if (config.samples_per_estimate < 1 || config.estimates_per_control < 1) {
+  if (samples_per_estimate < 1 || estimates_per_control < 1) {
     return fail(ConfigError::kPeriods);
   }
-  if (!config.gate.check()) return fail(ConfigError::kGate);
-  if (!config.front_end.check()) return fail(ConfigError::kFrontEnd);
-  if (!config.health.check()) return fail(ConfigError::kHealth);
-  if (!config.calibration.check()) return fail(ConfigError::kCalibration);
-  if (!config.fused.check()) return fail(ConfigError::kFused);
-  if (!config.path.check()) return fail(ConfigError::kTorquePath);
-  if (!config.load_friction.check()) return fail(ConfigError::kLoadFriction);
-  if (!config.force.check()) return fail(ConfigError::kCuttingForce);
-  if (!config.controller.check()) return fail(ConfigError::kControl);
+  if (!gate.check()) return fail(ConfigError::kGate);
+  if (!front_end.check()) return fail(ConfigError::kFrontEnd);
+  if (!health.check()) return fail(ConfigError::kHealth);
+  if (!calibration.check()) return fail(ConfigError::kCalibration);
+  if (!fused.check()) return fail(ConfigError::kFused);
+  if (!path.check()) return fail(ConfigError::kTorquePath);
+  if (!load_friction.check()) return fail(ConfigError::kLoadFriction);
+  if (!force.check()) return fail(ConfigError::kCuttingForce);
+  if (!controller.check()) return fail(ConfigError::kControl);
+  return {};
+}
+
+auto ControlLoop::make(const Config& config) noexcept -> std::expected<ControlLoop, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
   return ControlLoop{config};
 }
 

