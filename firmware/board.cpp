@@ -151,7 +151,7 @@ void Board::note_turning(const hal::Sample& sample) noexcept {
 void Board::note_foreign() noexcept {
   if (link_.fetch_foreign()) {
     own_.foreign_steps =
-        static_cast<std::uint32_t>(kForeignMemory_s / config_.supervisor.period_s) + 1;
+        static_cast<std::uint32_t>(kForeignMemory_s / config_.supervisor_period_s) + 1;
   } else if (own_.foreign_steps > 0) {
     --own_.foreign_steps;
   }
