@@ -124,6 +124,18 @@ class FuzzyPi {
     return strength;
   }
 
+  // The nine exchanges that put five values in order.
+  static constexpr void sort(std::array<float, 5>& values) noexcept {
+    auto& [a, b, c, d, e] = values;
+    const auto order = [](float& low, float& high) {
+      const float less = high < low ? high : low;
+      high = high < low ? low : high;
+      low = less;
+    };
+    order(a, d), order(b, e), order(a, c), order(b, d), order(a, b);
+    order(c, e), order(b, c), order(d, e), order(c, d);
+  }
+
   // (C60), in labels. One rule at least has half its strength: the area is never 0.
   [[nodiscard]] static constexpr float centroid(const Strengths& strength) noexcept {
     float area = 0.0F;
@@ -138,7 +150,7 @@ class FuzzyPi {
       };
       // Where a set leaves its slope, where one slope meets the other's plateau, where slopes meet.
       std::array<float, 5> corner{falling, 1.0F - falling, rising, 1.0F - rising, 0.5F};
-      std::sort(corner.begin(), corner.end());
+      sort(corner);
       float left = 0.0F;
       for (std::size_t k = 0; k <= corner.size(); ++k) {
         const float right = k < corner.size() ? corner[k] : 1.0F;
