@@ -62,6 +62,8 @@ struct NoSource {
   }
 };
 
+constexpr std::size_t kFramesATick = 8;
+
 // The bench's lathe on the fake bus, in control of its cut from 3 s on.
 struct Wired {
   firmware::host::Scenario scenario = committed_scenario("bench_lathe");
@@ -69,7 +71,7 @@ struct Wired {
   firmware::Board board = board_of(scenario);
   FakeCan can;
   FakeBytes bytes;
-  firmware::BoardCycle<FakeCan, FakeBytes, NoSource> cycle{
+  firmware::BoardCycle<FakeCan, FakeBytes, NoSource, kFramesATick> cycle{
       board, {.can = &can, .bytes = &bytes, .source = nullptr}};
   std::int64_t now_ns = 1'000'000'000;
   std::size_t heard = 0;
@@ -145,8 +147,8 @@ TEST(BoardCycle, TakesABoundedShareOfABabblingBus) {
   for (int k = 0; k < 100'000; ++k) wired.can.waiting.push_back(stray);
   const std::size_t before = wired.can.waiting.size();
   wired.step();
-  EXPECT_GE(wired.can.waiting.size() + decltype(wired.cycle)::kFramesATick, before);
-  EXPECT_LE(wired.can.most_asked, decltype(wired.cycle)::kFramesATick);
+  EXPECT_GE(wired.can.waiting.size() + kFramesATick, before);
+  EXPECT_LE(wired.can.most_asked, kFramesATick);
 }
 
 // What could not be sent is not kept: when there is room again, what comes first is of now.
