@@ -83,9 +83,10 @@ LockstepBoard::LockstepBoard(LockstepSocket& socket, const firmware::Machine& ma
   if (read_record() != LockstepRecord::kReady) fail("the board refuses the machine");
 }
 
-bool LockstepBoard::receive(const hal::can::Frame& frame, std::int64_t) {
+std::optional<firmware::LoopOutput> LockstepBoard::receive(const hal::can::Frame& frame,
+                                                           std::int64_t) {
   add(LockstepRecord::kFrame, hal::lockstep_bytes(frame));
-  return true;
+  return std::nullopt;
 }
 
 auto LockstepBoard::tick(std::int64_t now_ns, const firmware::BoardHealth&) -> Answer {

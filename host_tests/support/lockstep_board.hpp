@@ -46,7 +46,8 @@ class LockstepBoard {
   LockstepBoard(LockstepSocket& socket, const firmware::Machine& machine, std::uint8_t node,
                 float voltage_full_scale_v, float current_full_scale_a);
 
-  bool receive(const hal::can::Frame& frame, std::int64_t now_ns);
+  // Rows of a trace stay on the other side.
+  std::optional<firmware::LoopOutput> receive(const hal::can::Frame& frame, std::int64_t now_ns);
   // The board is told its health by its own image.
   Answer tick(std::int64_t now_ns, const firmware::BoardHealth& health);
   void sent() noexcept {}
