@@ -34,8 +34,8 @@ class CanBusMonitor {
       : echo_proves_acknowledge_(echo_proves_acknowledge) {}
 
   void error_frame(const CanErrorNews& news, std::int64_t now_ns) noexcept;
-  // Who talks also acknowledges: a missing acknowledge counts only where nobody was heard for 200 ms.
-  // Otherwise it would hang on the order in which frame and error were read within one tick.
+  // Who talks also acknowledges: a missing acknowledge counts only where nobody was heard for 200
+  // ms. Otherwise it would hang on the order in which frame and error were read within one tick.
   void foreign_frame(std::int64_t now_ns) noexcept {
     acknowledged_ = true;
     last_foreign_ns_ = now_ns;
