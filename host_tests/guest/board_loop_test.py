@@ -25,7 +25,8 @@ candump -L can0,081:7FF,181:7FF,7E0:7FF > /tmp/can.log & listening=$!
 candump -L -n 2500 can0 > /tmp/begin.log &
 ( {board.SERVICE} ) > /share/service 2>&1 & service=$!
 candump -n 1 can1,181:7FF > /dev/null; cut -d ' ' -f 1 /proc/uptime > /share/first_status
-cutforce cnc --can can1 --lathe /etc/bench_lathe.toml --control --duration {DURATION_S} --json \\
+cutforce cnc --can can1 --lathe /etc/bench_lathe.toml --control --abrupt \\
+  --duration {DURATION_S} --json \\
   --out /share/bench.csv > /share/bench.json 2> /dev/null || exit 3
 sleep 0.6  # without a CNC
 kill -TERM $service; wait $service || exit 4
