@@ -12,14 +12,12 @@ namespace {
 
 constexpr std::size_t kWidth = 96;
 
-constexpr std::array<std::string_view, 7> kSectionSentences{
-    "What the sensors deliver.",
-    "The motor, from its name plate and from measurement.",
-    "Friction of motor and spindle, seen from the motor.",
-    "From the motor to the cut.",
-    "The drive's own power output.",
-    "How the cutting force is estimated.",
-    "How the feed override is set."};
+constexpr auto kSectionSentences = std::to_array<std::string_view>(
+    {"What the sensors deliver.", "The motor, from its name plate and from measurement.",
+     "Friction of motor and spindle, seen from the motor.", "From the motor to the cut.",
+     "The drive's own power output.", "How the cutting force is estimated.",
+     "How the feed override is set.", "Who may move the feed, and when nobody may."});
+static_assert(kSectionSentences.size() == kSectionNames.size());
 
 std::string value_text(const Parameter& parameter, float value) {
   if (parameter.kind == Kind::kFlag) return value != 0.0F ? "true" : "false";
