@@ -125,11 +125,11 @@ class ControlTick {
   std::uint8_t override_pct_ = 100;
 };
 
-// The predictive law alone, in a cut.
-class PredictiveTick {
+// One law alone, in a cut.
+template <class Law>
+class LawTick {
  public:
-  explicit PredictiveTick(const control::Predictive::Config& config)
-      : law_(*control::Predictive::make(config)) {}
+  explicit LawTick(const typename Law::Config& config) : law_(*Law::make(config)) {}
 
   void prepare(std::uint32_t tick) noexcept {
     input_ = {.force_reference_n = 500.0F,
@@ -145,37 +145,13 @@ class PredictiveTick {
   void step() noexcept { override_pct_ = law_.step(input_).override_pct; }
 
  private:
-  control::Predictive law_;
+  Law law_;
   CutScript script_;
   control::LawInput input_{};
   float override_pct_ = 100.0F;
 };
-
-// The PI law alone: the like of the peers' PI controllers.
-class PiTick {
- public:
-  explicit PiTick(const control::PiController::Config& config)
-      : law_(*control::PiController::make(config)) {}
-
-  void prepare(std::uint32_t tick) noexcept {
-    input_ = {.force_reference_n = 500.0F,
-              .force_n = script_.force_n(tick, override_pct_),
-              .force_sigma_n = 5.0F,
-              .override_applied_pct = override_pct_,
-              .override_tolerance_pct = 0.5F,
-              .spindle_ratio = 1.0F,
-              .phase = control::CutPhase::kCut,
-              .mode = control::LawMode::kActive,
-              .part_start = false};
-  }
-  void step() noexcept { override_pct_ = law_.step(input_).override_pct; }
-
- private:
-  control::PiController law_;
-  CutScript script_;
-  control::LawInput input_{};
-  float override_pct_ = 100.0F;
-};
+using PredictiveTick = LawTick<control::Predictive>;
+using PiTick = LawTick<control::PiController>;  // the like of the peers' PI controllers
 
 // Instantaneous power of one sample, three phases in two axes.
 class SpaceVectorPower {
