@@ -1,6 +1,8 @@
 // A supervisor with everything around it in order, and a person who presses buttons.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include "control/supervisor.hpp"
 
 namespace cutforce::host_tests {
@@ -92,5 +94,13 @@ struct SupervisorBench {
     return output.state;
   }
 };
+
+// One that has been led to a state as a person would.
+[[nodiscard]] inline SupervisorBench bench_in(
+    control::SupervisorState state, const control::Supervisor::Config& config = kSupervised) {
+  SupervisorBench bench(config);
+  EXPECT_EQ(bench.lead_to(state), state);
+  return bench;
+}
 
 }  // namespace cutforce::host_tests
