@@ -80,7 +80,7 @@ void FrontEnd::fold() noexcept {  // (E5)
   map_.vb = {vb[1], vb[2], vb[3]};
   map_.ia = folded(current.alpha, c.current_gain_ratio, c.current_offset_a);
   map_.ib = folded(current.beta, c.current_gain_ratio, c.current_offset_a);
-  map_.residual = folded(ones, c.current_gain_ratio, c.current_offset_a);
+  residual_ = folded(ones, c.current_gain_ratio, c.current_offset_a);
 }
 
 }  // namespace cutforce::estimator

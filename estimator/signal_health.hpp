@@ -149,25 +149,34 @@ class SignalHealth {
     return SignalHealth{config};
   }
 
-  // Every sample that passed the gate; in two parts, so that a sample need not be made an
-  // observation that nobody looks at.
+  // Every sample that passed the gate.
   void observe(const Observation& observation) noexcept {
-    if (wants(observation.elapsed_periods, observation.at_end_channels)) look(observation);
+    state_.elapsed_periods += observation.elapsed_periods;
+    state_.at_end_channels |= observation.at_end_channels;
+    if (state_.countdown-- != 0) return;
+    look(observation.voltage_v, observation.current_a, observation.motor,
+         observation.current_residual_a, 0);
   }
-  [[nodiscard]] bool wants(float elapsed_periods, std::uint32_t at_end_channels) noexcept {
-    state_.elapsed_periods += elapsed_periods;
-    state_.at_end_channels |= at_end_channels;
-    return state_.countdown-- == 0;
+  // The same for `count` samples that follow each other by one period, none at the end of a range:
+  // the one to look(), or `count`.
+  [[nodiscard]] std::uint32_t wanted(std::uint32_t count) noexcept {
+    const auto place = static_cast<std::uint32_t>(state_.countdown);  // negative: beyond any run
+    state_.countdown -= static_cast<std::int32_t>(count);
+    state_.elapsed_periods += static_cast<float>(place < count ? place + 1 : count);
+    return place < count ? place : count;
   }
-  void look(const Observation& observation) noexcept {
-    const auto& v = observation.voltage_v;
-    const auto& i = observation.current_a;
-    state_.picked = {.channel = {v[0], v[1], v[2], i[0], i[1], i[2]},
-                     .motor = observation.motor,
-                     .current_residual_a = observation.current_residual_a,
-                     .angle_rad = 0.0F};
+  // samples_since: those counted with this one that follow it.
+  void look(const std::array<float, 3>& voltage_v, const std::array<float, 3>& current_a,
+            const MotorSample& motor, float current_residual_a,
+            std::uint32_t samples_since) noexcept {
+    const auto& v = voltage_v;
+    const auto& i = current_a;
+    state_.picked.channel = {v[0], v[1], v[2], i[0], i[1], i[2]};
+    state_.picked.motor = motor;
+    state_.picked.current_residual_a = current_residual_a;
+    state_.picked.angle_rad = 0.0F;
     state_.picked_periods = state_.elapsed_periods;
-    state_.elapsed_periods = 0.0F;
+    state_.elapsed_periods = static_cast<float>(samples_since);
     state_.is_picked = 1;
   }
 
