@@ -1,11 +1,11 @@
 // Raw channels to star-equivalent space vectors, amplitude-invariant.
 // Equations (E1)-(E8): estimator/EQUATIONS.md.
 //
-//   x = g (x_raw - o)                                    each channel, g and o from idle
-//   calibration v = (2/3) (v_u - (v_v + v_w)/2) + j (v_v - v_w)/sqrt(3)              line to
-//   neutral v = (v_uv - v_wu)/3 + j v_vw/sqrt(3),   v_wu = -(v_uv + v_vw)        line to line i =
-//   as the first line,                  i_w = -(i_u + i_v)           line currents v <- v exp(-j
-//   w_e t_lead)                            voltages sampled ahead of the currents
+//   x = g (x_raw - o)                                      each channel, by idle calibration
+//   v = (2/3) (v_u - (v_v + v_w)/2) + j (v_v - v_w)/sqrt(3)              line to neutral
+//   v = (v_uv - v_wu)/3 + j v_vw/sqrt(3),   v_wu = -(v_uv + v_vw)        line to line
+//   i = as the first line,                  i_w = -(i_u + i_v)           line currents
+//   v <- v exp(-j w_e t_lead)                          voltages sampled ahead of the currents
 //
 // Assumes a three-wire motor: the zero sequence carries no power and does not appear in a vector.
 // A delta winding needs no other formula, only a third of its phase resistance (E8).

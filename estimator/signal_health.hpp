@@ -7,17 +7,15 @@
 //                  frequency changes by 20 %
 //   lost_phase     a channel whose fundamental and mean are below 1/4 of the largest of its kind
 //   phase_order    at steady frequency, for 0.3 s: voltage and current turn in opposite senses, or
-//   a
-//                  negative sequence or a residual above 1/3 of the positive sequence; for 1 s:
+//                  a negative sequence or a residual above 1/3 of the positive sequence; for 1 s:
 //                  reactive power below -0.1 S (an induction machine always takes some) or active
 //                  power below -0.2 S (braking changes the speed)
 //   raw_pwm        see raw_pwm.hpp; or for 0.15 s a voltage below 5 % of what rated flux induces;
-//   or
-//                  for 1.5 s at steady frequency the flux |v - R_s i|/w_e outside 0.3 to 1.5 of its
-//                  rated value
+//                  or for 1.5 s at steady frequency the flux |v - R_s i|/w_e outside 0.3 to 1.5 of
+//                  its rated value
 //   clipped        within one electrical period in two ticks at the end of the range, or a current
-//   twice
-//                  flat for more than T_e/12 (voltages may be: a line voltage in overmodulation is)
+//                  twice flat for more than T_e/12 (voltages may be: a line voltage in
+//                  overmodulation is)
 //
 // Nothing that needs rotation is judged below `minimum_frequency_rad_s`, with the frequency
 // unknown, or while the current does not turn at it. A fault stays for `hold_s` after it was last
