@@ -218,7 +218,7 @@ auto Predictive::step(const Input& input) noexcept -> Output {
     if (config_.learns) map_.pass(feed_ratio(feed.mean));  // the tool moves on
     return law_answer(input.override_applied_pct);
   }
-  const float gain_before_n = tracker_.state().gain_n;
+  const float gain_before_n = tracker_.gain_n();
   const auto seen = tracker_.step({.reading_n = input.force_n,
                                    .feed = feed.mean * speed,
                                    .feed_sigma = feed.sigma * speed * s.timing_doubt,
