@@ -106,12 +106,6 @@ void PathMap::believe(std::uint32_t cell, std::uint32_t count) noexcept {
   merge(cell, flat ? sum : own, flat ? count : 1);
 }
 
-void PathMap::pass(float feed_ratio) noexcept {  // (C92)
-  State& s = state_;
-  s.earlier_s = {s.position_s, s.earlier_s[0]};
-  s.position_s += feed_ratio * config_.period_s;
-}
-
 void PathMap::learn(const Lesson& lesson) noexcept {
   State& s = state_;
   pass(lesson.feed_ratio);
