@@ -1,12 +1,11 @@
 #include "control/jump_resolver.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace cutforce::control {
 namespace {
-
-using estimator::exp_bounded;
 
 constexpr float kJump_ratio = 1.0F;      // spread of a jump, of the gain
 constexpr float kEntry_variance = 2.0F;  // of the first gain, of the square of the remembered one
@@ -19,6 +18,21 @@ constexpr float kBadFitEach = 4.0F;
 constexpr std::array<float, JumpResolver::kMomentsOfTick> kOnset{0.05F, 0.35F, 0.7F};  // of a tick
 
 constexpr float square(float x) noexcept { return x * x; }
+
+// exp(-difference/2) of two misfits, nothing below 1e-9; relative error <= 1e-4. The misfits
+// themselves are as uncertain as the noise, a tenth and more, and the prior is a guess.
+float share_of(float difference) noexcept {
+  constexpr float kHalfLogOfTwo = 0.72134752F;
+  constexpr float kNegligible = -30.0F;
+  constexpr float kRounder = 12582912.0F;  // 1.5 * 2^23, see polynomials.hpp
+  const float x = kHalfLogOfTwo * difference;
+  if (!(x > kNegligible)) return 0.0F;
+  const float rounded = x + kRounder;
+  const float r = x - (rounded - kRounder);
+  const float power = ((5.5171672e-2F * r + 2.4261113e-1F) * r + 6.9326099e-1F) * r + 9.9992820e-1F;
+  const auto whole = std::bit_cast<std::uint32_t>(rounded) << 23U;
+  return std::bit_cast<float>(std::bit_cast<std::uint32_t>(power) + whole);
+}
 
 }  // namespace
 
@@ -45,25 +59,19 @@ inline auto JumpResolver::advance_base(const Reading& reading, float gain_n) noe
                     lag_.sensed_input * drive;
   s.base.force_n = lag_.cut * s.base.force_n + left_ * drive;
   const float residual_n = reading.reading_n - s.base.sensed_n;
-  s.residual += square(residual_n) / variance_n2;
-  return {.n = residual_n, .variance_n2 = variance_n2};
+  const float sharpness = 1.0F / variance_n2;
+  const float pull = residual_n * sharpness;
+  s.residual += residual_n * pull;
+  return {.sharpness = sharpness, .pull = pull};
 }
 
-inline auto JumpResolver::prior() const noexcept -> Prior {
-  const State& s = state_;
-  const float sharpness = 1.0F / s.prior_variance_n2;
-  return {.sharpness = sharpness,
-          .pull = s.prior_mean_n * sharpness,
-          .misfit = square(s.prior_mean_n) * sharpness + s.residual};
-}
-
-// The gain that fits a moment best, and how badly it still does. (C81)
-inline void JumpResolver::fit(const Moment& moment, const Prior& prior, Fit& fit,
-                              float& least) noexcept {
-  fit.sharpness = prior.sharpness + moment.weight;
-  fit.jump_n = (prior.pull + moment.fit) / fit.sharpness;
-  fit.misfit = prior.misfit - fit.sharpness * square(fit.jump_n);
-  least = std::min(least, fit.misfit);
+// The gain that fits a moment best, and how badly it still does; `misfit` is that of no gain. (C81)
+inline void JumpResolver::fit(const Moment& moment, float misfit, Fit& fit, float& least) noexcept {
+  const float jump_n = moment.pull / moment.sharpness;
+  const float still = misfit - moment.pull * jump_n;
+  fit.jump_n = jump_n;
+  fit.misfit = still;
+  least = std::min(least, still);
 }
 
 // Mean and spread over the moments and over "nothing happened". (C81), (C82)
@@ -72,40 +80,41 @@ inline void JumpResolver::fit(const Moment& moment, const Prior& prior, Fit& fit
 // that before: exp(-m/2) / sqrt(sharpness * variance), which a square root gives for a logarithm.
 void JumpResolver::conclude(Fits& fits, ForceBelief& belief) const noexcept {
   const State& s = state_;
-  const float nothing = kNothing * exp_bounded(0.5F * (fits.least - s.residual));
+  const float nothing = kNothing / kEachMoment * share_of(fits.least - s.residual);
   float sum = nothing;
-  for (Fit& fit : fits.of) {
-    fit.share = kEachMoment * exp_bounded(0.5F * (fits.least - fit.misfit)) /
-                std::sqrt(fit.sharpness * s.prior_variance_n2);
-    sum += fit.share;
-  }
-  const float scale = 1.0F / sum;
   float gain_n = 0.0F;
   float force_n = 0.0F;
   float sensed_n = 0.0F;
   for (std::size_t k = 0; k < kMoments; ++k) {
-    fits.of[k].share *= scale;
     const Moment& m = s.moments[k];
-    const float weighed_n = fits.of[k].share * fits.of[k].jump_n;
+    Fit& fit = fits.of[k];
+    fit.share = share_of(fits.least - fit.misfit) / std::sqrt(m.sharpness * s.prior_variance_n2);
+    sum += fit.share;
+    const float weighed_n = fit.share * fit.jump_n;
     gain_n += weighed_n;
     force_n += weighed_n * m.force;
     sensed_n += weighed_n * m.sensed;
   }
+  const float scale = 1.0F / sum;
+  gain_n *= scale;
+  force_n *= scale;
+  sensed_n *= scale;
   // "Nothing happened" stands for a jump of zero, whose variance is the base's.
-  const float still = nothing * scale;
-  float ff = still * square(force_n);
-  float fs = still * force_n * sensed_n;
-  float fk = still * force_n * gain_n;
-  float ss = still * square(sensed_n);
-  float sk = still * sensed_n * gain_n;
-  float kk = still * (square(gain_n) + s.base.variance_n2);
+  const float still_f = nothing * force_n;
+  const float still_r = nothing * sensed_n;
+  float ff = still_f * force_n;
+  float fs = still_f * sensed_n;
+  float fk = still_f * gain_n;
+  float ss = still_r * sensed_n;
+  float sk = still_r * gain_n;
+  float kk = nothing * (square(gain_n) + s.base.variance_n2);
   for (std::size_t k = 0; k < kMoments; ++k) {
     const Moment& m = s.moments[k];
     const Fit& fit = fits.of[k];
     const float f = fit.jump_n * m.force - force_n;
     const float r = fit.jump_n * m.sensed - sensed_n;
     const float g = fit.jump_n - gain_n;
-    const float variance_n2 = fit.share / fit.sharpness;
+    const float variance_n2 = fit.share / m.sharpness;
     const float variance_f = variance_n2 * m.force;
     const float variance_r = variance_n2 * m.sensed;
     const float share_f = fit.share * f;
@@ -117,7 +126,7 @@ void JumpResolver::conclude(Fits& fits, ForceBelief& belief) const noexcept {
     sk += share_r * g + variance_r;
     kk += fit.share * g * g + variance_n2;
   }
-  belief.covariance = {ff, fs, fk, ss, sk, kk};
+  belief.covariance = {scale * ff, scale * fs, scale * fk, scale * ss, scale * sk, scale * kk};
   belief.gain_n = std::clamp(s.base.gain_n + gain_n, 0.0F, most_gain_n_);
   belief.force_n = s.base.force_n + force_n;
   belief.sensed_n = s.base.sensed_n + sensed_n;
@@ -138,16 +147,19 @@ void JumpResolver::start(const Point& past, const Reading& now, float memory_n,
   s.residual = 0.0F;
   s.timing_n2 = 0.0F;
   const bool from_air = !(past.gain_n > kFromAir_ratio * memory_n);
-  s.prior_mean_n = from_air ? memory_n : 0.0F;
-  s.prior_variance_n2 =
+  const float variance_n2 =
       from_air ? kEntry_variance * square(memory_n) : square(kJump_ratio * past.gain_n);
+  const float sharpness = 1.0F / variance_n2;
+  const float pull = from_air ? memory_n * sharpness : 0.0F;
+  s.prior_variance_n2 = variance_n2;
+  s.prior_misfit = pull * memory_n;
   const Residual first = advance_base({.reading_n = past.reading_n,
                                        .feed = past.feed,
                                        .feed_sigma = past.feed_sigma,
                                        .noise_n2 = now.noise_n2},
                                       belief.gain_n);
   const Residual second = advance_base(now, belief.gain_n);
-  const Prior before = prior();
+  const float misfit = s.prior_misfit + s.residual;
   Fits fits;
   float least = s.residual;
   const float push = left_ * now.feed;
@@ -159,16 +171,17 @@ void JumpResolver::start(const Point& past, const Reading& now, float memory_n,
     const float force = onset.force * past.feed;
     early.sensed = lag_.sensed * sensed + lag_.sensed_force * force + sensed_push;
     early.force = lag_.cut * force + push;
-    early.fit = sensed * first.n / first.variance_n2 + early.sensed * second.n / second.variance_n2;
-    early.weight = square(sensed) / first.variance_n2 + square(early.sensed) / second.variance_n2;
-    fit(early, before, fits.of[k], least);
+    early.pull = pull + sensed * first.pull + early.sensed * second.pull;
+    early.sharpness =
+        sharpness + square(sensed) * first.sharpness + square(early.sensed) * second.sharpness;
+    fit(early, misfit, fits.of[k], least);
 
     Moment& late = s.moments[kMomentsOfTick + k];
     late.sensed = onset.sensed * now.feed;
     late.force = onset.force * now.feed;
-    late.fit = late.sensed * second.n / second.variance_n2;
-    late.weight = square(late.sensed) / second.variance_n2;
-    fit(late, before, fits.of[kMomentsOfTick + k], least);
+    late.pull = pull + late.sensed * second.pull;
+    late.sharpness = sharpness + square(late.sensed) * second.sharpness;
+    fit(late, misfit, fits.of[kMomentsOfTick + k], least);
   }
   fits.least = least;
   s.samples = kTicks;
@@ -182,7 +195,7 @@ auto JumpResolver::follow(const Point& past, const Reading& now, float memory_n,
   State& s = state_;
   ++s.samples;
   const Residual residual = advance_base(now, belief.gain_n);
-  const Prior before = prior();
+  const float misfit = s.prior_misfit + s.residual;
   Fits fits;
   float least = s.residual;
   const float push = left_ * now.feed;
@@ -191,9 +204,9 @@ auto JumpResolver::follow(const Point& past, const Reading& now, float memory_n,
     Moment& m = s.moments[k];
     m.sensed = lag_.sensed * m.sensed + lag_.sensed_force * m.force + sensed_push;
     m.force = lag_.cut * m.force + push;
-    m.fit += m.sensed * residual.n / residual.variance_n2;
-    m.weight += square(m.sensed) / residual.variance_n2;
-    fit(m, before, fits.of[k], least);
+    m.pull += m.sensed * residual.pull;
+    m.sharpness += square(m.sensed) * residual.sharpness;
+    fit(m, misfit, fits.of[k], least);
   }
   fits.least = least;
   if (!(least > kBadFit + kBadFitEach * static_cast<float>(s.samples))) {

@@ -64,16 +64,17 @@ class JumpResolver {
   struct Moment {
     float force = 0.0F;  // response of F and s to a unit of gain since the jump
     float sensed = 0.0F;
-    float fit = 0.0F;     // sum of h r / R
-    float weight = 0.0F;  // sum of h^2 / R
+    // Of the gain that fits best, with the prior's share: its sharpness times it,
+    float pull = 0.0F;       // mu / V + sum of h r / R
+    float sharpness = 0.0F;  // 1 / V + sum of h^2 / R, 1 / its variance
   };
 
   struct State {
     Point base{};  // open loop since the jump may have begun
     std::array<Moment, kMoments> moments{};
-    float residual = 0.0F;   // sum of r^2 / R if nothing happened
-    float timing_n2 = 0.0F;  // variance of the reading because the feed's moment is unknown
-    float prior_mean_n = 0.0F;
+    float residual = 0.0F;      // sum of r^2 / R if nothing happened
+    float timing_n2 = 0.0F;     // variance of the reading because the feed's moment is unknown
+    float prior_misfit = 0.0F;  // mu^2 / V
     float prior_variance_n2 = 1.0F;
     std::uint32_t samples = 0;   // 0: no jump
     std::uint32_t restarts = 0;  // of this jump, because no moment fitted
@@ -108,33 +109,25 @@ class JumpResolver {
 
  private:
   struct Fit {
-    float sharpness;  // 1 / variance of the gain
-    float jump_n;     // of the gain
-    float misfit;     // sum of r^2 / R, with the prior's share
-    float share;      // probability
+    float jump_n;  // of the gain
+    float misfit;  // sum of r^2 / R, with the prior's share
+    float share;   // probability, not yet of a sum of 1
   };
   struct Fits {
     std::array<Fit, kMoments> of;
     float least;  // misfit of the best, "nothing happened" among them
   };
   struct Residual {  // of a reading from the open loop
-    float n;
-    float variance_n2;
+    float sharpness;  // 1 / R
+    float pull;       // r / R
   };
   struct Onset {  // response to a unit of feed at the end of the tick in which the jump was
     float force;
     float sensed;
   };
-  struct Prior {
-    float sharpness;
-    float pull;
-    float misfit;  // with the residual
-  };
-
   void start(const Point& past, const Reading& now, float memory_n, ForceBelief& belief) noexcept;
   [[nodiscard]] Residual advance_base(const Reading& reading, float gain_n) noexcept;
-  [[nodiscard]] Prior prior() const noexcept;
-  static void fit(const Moment& moment, const Prior& prior, Fit& fit, float& least) noexcept;
+  static void fit(const Moment& moment, float misfit, Fit& fit, float& least) noexcept;
   void conclude(Fits& fits, ForceBelief& belief) const noexcept;
 
   LagStep lag_;
