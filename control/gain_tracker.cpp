@@ -1,23 +1,22 @@
 #include "control/gain_tracker.hpp"
 
+#include <algorithm>
+#include <cmath>
+
+#include "control/gain_tracker_tick.hpp"
+
 namespace cutforce::control {
 namespace {
 
 constexpr float kTrendMemory_s = 0.25F;
 constexpr float kNoiseMemory_s = 20.0F;
+constexpr float kUsualPower = 0.9F;  // of a normal variable cut off at kUsual, less a margin
 constexpr float kTwiceThreshold_ratio = 0.81F;
 constexpr float kModelSpread_ratio =
     0.06F;  // of a gain that was learned from a jump: the lags are not exact
 constexpr float kBeginSpread_ratio = 0.2F;
 constexpr float kLeastFeed = 0.01F;
 constexpr float kMostGain_ratio = 1000.0F;  // of the config's: no cut
-
-JumpResolver::Reading reading_of(const GainTracker::Input& input, float noise_n2) noexcept {
-  return {.reading_n = input.reading_n,
-          .feed = input.feed,
-          .feed_sigma = input.feed_sigma,
-          .noise_n2 = noise_n2};
-}
 
 }  // namespace
 
@@ -36,7 +35,8 @@ GainTracker::GainTracker(const Config& config) noexcept
       most_gain_n_(kMostGain_ratio * config.gain_n),
       sqrt_period_(std::sqrt(config.period_s)),
       memory_share_(config.period_s / (kTrendMemory_s + config.period_s)),
-      noise_memory_share_(config.period_s / (kNoiseMemory_s + config.period_s)),
+      noise_kept_(kNoiseMemory_s / (kNoiseMemory_s + config.period_s)),
+      noise_share_(config.period_s / (kNoiseMemory_s + config.period_s) / kUsualPower),
       jump_({.period_s = config.period_s,
              .cut_lag_s = config.cut_lag_s,
              .sensor_lag_s = config.sensor_lag_s,
@@ -57,13 +57,13 @@ void GainTracker::settle_in_air() noexcept {
 }
 
 // The first reading of all: as if the force had been this for long.
-void GainTracker::begin(const Input& input) noexcept {
+void GainTracker::begin(float reading_n, float feed, float entry_n) noexcept {
   Own& s = own_;
   s.started = 1;
-  if (!(input.reading_n > input.entry_n && input.feed > kLeastFeed)) return;
+  if (!(reading_n > entry_n && feed > kLeastFeed)) return;
   s.air = 0;
-  s.now.force_n = s.now.sensed_n = input.reading_n;
-  s.now.gain_n = std::min(input.reading_n / input.feed, most_gain_n_);
+  s.now.force_n = s.now.sensed_n = reading_n;
+  s.now.gain_n = std::min(reading_n / feed, most_gain_n_);
   s.now.covariance[ForceBelief::kKK] = square(kBeginSpread_ratio * s.now.gain_n);
   s.now.covariance[ForceBelief::kFF] = square(kBeginSpread_ratio * s.now.force_n);
 }
@@ -71,9 +71,9 @@ void GainTracker::begin(const Input& input) noexcept {
 // A covariance far above that of a reading comes out indefinite in single precision: a variance
 // below zero, and from it a reading's that has no root. No variance is below zero, and no
 // correlation above one.
-void GainTracker::make_sound(ForceBelief& x) noexcept {
+void GainTracker::make_sound() noexcept {
   using enum ForceBelief::Covariance;
-  auto& covariance = x.covariance;
+  auto& covariance = own_.now.covariance;
   const auto spread = [&covariance](std::size_t k) {
     covariance[k] = std::max(covariance[k], 0.0F);
     return std::sqrt(covariance[k]);
@@ -86,27 +86,25 @@ void GainTracker::make_sound(ForceBelief& x) noexcept {
   covariance[kSK] = std::clamp(covariance[kSK], -s * k, s * k);
 }
 
-void GainTracker::begin_jump(const Input& input, float noise_n2) noexcept {
+void GainTracker::begin_jump(const JumpResolver::Reading& reading) noexcept {
   Own& s = own_;
   const JumpResolver::Point past = s.past;
-  remember(input);
+  remember(reading);
   s.air = 0;
-  jump_.begin(past, reading_of(input, noise_n2), s.memory_n, s.now);
+  jump_.begin(past, reading, s.memory_n, s.now);
   s.last_innovation = 0.0F;
   s.correlation = 0.0F;
 }
 
 // A jump that is being followed: one more reading. (C83)
-auto GainTracker::follow_on(const Input& input, float noise_n2) noexcept -> JumpResolver::Outcome {
+auto GainTracker::follow_on(const JumpResolver::Reading& reading) noexcept
+    -> JumpResolver::Outcome {
   Own& s = own_;
   const JumpResolver::Point past = s.past;
-  remember(input);
+  remember(reading);
   s.last_innovation = 0.0F;
-  const auto outcome = jump_.follow(past, reading_of(input, noise_n2), s.memory_n, s.now);
-  if (outcome == JumpResolver::Outcome::kGivesUp) {
-    begin(input);
-    return outcome;
-  }
+  const auto outcome = jump_.follow(past, reading, s.memory_n, s.now);
+  if (outcome == JumpResolver::Outcome::kGivesUp) return outcome;
   s.correlation = 0.0F;
   if (jump_.finish())
     s.now.covariance[ForceBelief::kKK] += square(kModelSpread_ratio * s.now.gain_n);
@@ -125,7 +123,7 @@ void GainTracker::restart() noexcept {
 
 void GainTracker::coast(float feed) noexcept {
   predict(own_.now, feed, 0.0F, kDrift_ratio_sqrt_s * sqrt_period_);
-  keep_sound(own_.now);
+  if (!sound(own_.now)) make_sound();
   jump_.drop();
   own_.ticks = 0;
 }

@@ -1,9 +1,10 @@
-// The tick. predictive_plan.hpp and gain_tracker.hpp become one function with it; what is rare, or
+// The tick. predictive_plan.hpp and gain_tracker_tick.hpp become one function with it; what is rare, or
 // not every machine's, stands apart.
 #include "control/predictive.hpp"
 
 #include <algorithm>
 
+#include "control/gain_tracker_tick.hpp"
 #include "control/predictive_plan.hpp"
 
 namespace cutforce::control {
@@ -68,12 +69,12 @@ inline auto Predictive::known_feed(float applied_pct) noexcept -> KnownFeed {
   const float before_w = sent()[whole_ticks_ + 1];
   const float after_w = sent()[whole_ticks_];
   FeedState feed = s.feed;
-  const float first = feed.advance(early_, config_.feed_lag_s, before_w);
-  const float second = feed.advance(late_, config_.feed_lag_s, after_w);
+  const float first = feed.advance(early_, before_w);
+  const float second = feed.advance(late_, after_w);
   s.feed = feed;
   const float step = after_w - before_w;
-  return {.mean = (early_.length_s * first + late_.length_s * second) / config_.period_s,
-          .sigma = estimator::magnitude(step) * config_.latency_sigma_s / config_.period_s};
+  return {.mean = early_share_ * first + late_share_ * second,
+          .sigma = estimator::magnitude(step) * latency_sigma_ratio_};
 }
 
 inline float Predictive::feed_ratio(float w) noexcept {

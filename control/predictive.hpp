@@ -159,8 +159,10 @@ class Predictive {
 
   // In the order of what is asked for most: a Cortex-M7 reaches a float within 1 kB of a pointer.
   Config config_;
-  std::uint32_t whole_ticks_;    // of the dead time
-  LagStep tick_, early_, late_;  // early_: the part of a tick before a byte arrives
+  std::uint32_t whole_ticks_;       // of the dead time
+  LagStep tick_, early_, late_;     // early_: the part of a tick before a byte arrives
+  float early_share_, late_share_;  // of the tick
+  float latency_sigma_ratio_;       // of the tick
   std::array<Horizon, kReaches> horizons_;
   float ahead_s_;                   // that the trend of the gain is feared for
   float inverse_exponent_;          // 1/p

@@ -85,6 +85,7 @@ auto Predictive::make(const Config& config) noexcept -> std::expected<Predictive
 Predictive::Predictive(const Config& config) noexcept
     : config_(config),
       tick_(lag_step(config, config.period_s)),
+      latency_sigma_ratio_(config.latency_sigma_s / config.period_s),
       inverse_exponent_(1.0F / config.feed_exponent),
       step_pct_(static_cast<float>(config.step_pct)),
       forgets_ratio_(exp_bounded(-config.recovery_1_s * config.period_s)),
@@ -115,6 +116,8 @@ void Predictive::assume_latency(float latency_s) noexcept {  // (C71)
       std::max(latency_s - static_cast<float>(whole_ticks_) * config_.period_s, 0.0F);
   early_ = lag_step(config_, early_s);
   late_ = lag_step(config_, config_.period_s - early_s);
+  early_share_ = early_.length_s / config_.period_s;
+  late_share_ = late_.length_s / config_.period_s;
   ahead_s_ = latency_s + config_.period_s + 0.5F * config_.process_lag_s;
   const float dead_decay = exp_bounded(-latency_s / config_.process_lag_s);
   const float decay = tick_.cut;

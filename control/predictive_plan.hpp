@@ -88,7 +88,7 @@ inline auto Predictive::forecast(float force_n, float drive_n) noexcept -> Forec
   FeedState feed = own_.feed;
   float path_s = 0.0F;
   const auto go = [&](const LagStep& step, float w) {
-    const float mean = feed.advance(step, config_.feed_lag_s, w);
+    const float mean = feed.advance(step, w);
     if (measures) path_s += step.length_s * feed_ratio(mean);
     force_n = step.cut * force_n + (1.0F - step.cut) * drive_n * mean;
   };

@@ -1,4 +1,4 @@
-#include "control/gain_tracker.hpp"
+#include "control/gain_tracker_tick.hpp"
 
 #include <gtest/gtest.h>
 
