@@ -102,6 +102,7 @@ class GainTracker {
   // Another part: only the last gain is remembered.
   void restart() noexcept;
 
+  [[nodiscard]] bool follows_jump() const noexcept { return jump_.active(); }
   [[nodiscard]] float gain_n() const noexcept { return own_.now.gain_n; }
   [[nodiscard]] State state() const noexcept { return {.own = own_, .jump = jump_.state()}; }
   void restore(const State& state) noexcept {

@@ -109,6 +109,9 @@ class Predictive {
   // nothing of this part, whose path nobody followed.
   void rejoin() noexcept;
 
+  // Whether a jump of the process gain is being followed: the dearest ticks.
+  [[nodiscard]] bool follows_jump() const noexcept { return tracker_.follows_jump(); }
+
   [[nodiscard]] State state() const noexcept;
   void restore(const State& state) noexcept;
 
