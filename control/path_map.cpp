@@ -2,12 +2,10 @@
 
 #include <algorithm>
 
-#include "estimator/polynomials.hpp"
+#include "control/feed_power.hpp"
 
 namespace cutforce::control {
 namespace {
-
-using estimator::power_positive;
 
 constexpr float kScale = 1024.0F;       // of e
 constexpr std::uint16_t kFree = 65535;  // air, or so light a cut that nothing limits
@@ -41,16 +39,16 @@ constexpr std::size_t index_of(float position_s) noexcept {
 PathMap::PathMap(const Config& config) noexcept
     : config_(config),
       inverse_exponent_(1.0F / config.feed_exponent),
-      wear_far_ratio_(power_positive(kFar_ratio, inverse_exponent_)),
-      wear_least_ratio_(power_positive(kWearMost, -inverse_exponent_)),
-      wear_most_ratio_(power_positive(kWearLeast, -inverse_exponent_)) {
+      wear_far_ratio_(feed_power(kFar_ratio, inverse_exponent_)),
+      wear_least_ratio_(feed_power(kWearMost, -inverse_exponent_)),
+      wear_most_ratio_(feed_power(kWearLeast, -inverse_exponent_)) {
   state_.last_cell = kFree;
 }
 
 // e of a gain; 0 where nothing limits. (C93)
 float PathMap::feed_at_reference(float gain_n) const noexcept {
   if (!(gain_n > 0.02F * config_.gain_n)) return 0.0F;
-  return power_positive(gain_n / config_.gain_n, -inverse_exponent_);
+  return feed_power(gain_n / config_.gain_n, -inverse_exponent_);
 }
 
 // In whole numbers, which say the same as fractions would. What is heavier than known is believed
@@ -168,7 +166,7 @@ float PathMap::limit(const Question& question) noexcept {
   if (!limits()) return question.override_pct;
   if (question.reference_n != reference_n_) {
     reference_n_ = question.reference_n;
-    reference_feed_ = power_positive(reference_n_ / config_.gain_n, inverse_exponent_);
+    reference_feed_ = feed_power(reference_n_ / config_.gain_n, inverse_exponent_);
   }
   const float scale_pct =
       100.0F / kScale * question.spindle_ratio * reference_feed_ * s.wear_feed_ratio;  // (C94)

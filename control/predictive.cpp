@@ -1,9 +1,10 @@
-// The tick. predictive_plan.hpp and gain_tracker_tick.hpp become one function with it; what is rare, or
-// not every machine's, stands apart.
+// The tick. predictive_plan.hpp and gain_tracker_tick.hpp become one function with it; what is
+// rare, or not every machine's, stands apart.
 #include "control/predictive.hpp"
 
 #include <algorithm>
 
+#include "control/feed_power.hpp"
 #include "control/gain_tracker_tick.hpp"
 #include "control/predictive_plan.hpp"
 
@@ -27,7 +28,7 @@ void Predictive::begin_part() noexcept {
 // Another decides, and the force tells nothing.
 auto Predictive::hold(const KnownFeed& feed, float speed, float applied_pct) noexcept -> Output {
   tracker_.coast(feed.mean * speed);
-  if (config_.learns) map_.pass(feed_ratio(feed.mean));  // the tool moves on
+  if (config_.learns && map_.records()) map_.pass(feed_ratio(feed.mean));  // the tool moves on
   return law_answer(applied_pct);
 }
 
@@ -60,7 +61,7 @@ inline auto Predictive::known_feed(float applied_pct) noexcept -> KnownFeed {
   if (applied_pct == s.sent_pct) {
     s.held_s += config_.period_s;
   } else {
-    now = applied_pct > 0.0F ? power_of_feed(0.01F * applied_pct, config_.feed_exponent) : 0.0F;
+    now = applied_pct > 0.0F ? feed_power(0.01F * applied_pct, config_.feed_exponent) : 0.0F;
     s.held_s = 0.0F;
     s.sent_pct = applied_pct;
   }
@@ -80,14 +81,14 @@ inline auto Predictive::known_feed(float applied_pct) noexcept -> KnownFeed {
 inline float Predictive::feed_ratio(float w) noexcept {
   if (w != asked_w_) {
     asked_w_ = w;
-    answered_ratio_ = w > 1e-4F ? power_of_feed(w, inverse_exponent_) : 0.0F;
+    answered_ratio_ = w > 1e-4F ? feed_power(w, inverse_exponent_) : 0.0F;
   }
   return answered_ratio_;
 }
 
 inline void Predictive::learn(const GainTracker::Output& seen, float feed, bool settled) noexcept {
+  if (!map_.records()) return;  // the way begins with the part
   const float ratio = feed_ratio(feed);
-  if (!map_.records()) return map_.pass(ratio);
   map_.learn({.feed_ratio = ratio,
               .gain_n = seen.gain_n,
               .jumped = seen.jumped,
@@ -114,7 +115,7 @@ auto Predictive::step(const Input& input) noexcept -> Output {
   const float applied_pct = input.override_applied_pct;
   const float reference_n = input.force_reference_n;
   const float speed = input.spindle_ratio != 1.0F && input.spindle_ratio > 0.0F
-                          ? power_of_feed(input.spindle_ratio, -config_.feed_exponent)
+                          ? feed_power(input.spindle_ratio, -config_.feed_exponent)
                           : 1.0F;
   const KnownFeed feed = known_feed(applied_pct);
   if (input.mode == LawMode::kHold) [[unlikely]] {

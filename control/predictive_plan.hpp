@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "control/feed_power.hpp"
 #include "control/predictive.hpp"
 
 namespace cutforce::control {
@@ -12,11 +13,6 @@ namespace cutforce::control {
 inline constexpr float kLong_s = 100.0F;      // as long as ever
 inline constexpr float kLost_s = 0.5F;        // after which a cut that is left is a light one
 inline constexpr float kAfterJump_s = 0.35F;  // of faster recovery
-
-// Once in the image, not wherever it is asked for.
-[[gnu::noinline]] inline float power_of_feed(float x, float p) noexcept {
-  return estimator::power_positive(x, p);
-}
 
 // (C84)
 inline float Predictive::pessimistic_gain_n(const GainTracker::Output& seen,
@@ -135,8 +131,7 @@ inline float Predictive::wanted_pct(const Forecast& ahead, const Horizon& horizo
   const float limited = std::min(w, over * reference_n / drive_n);
   if (!(limited > 1e-4F)) return config_.floor_pct;
   if (limited > 1e4F) return config_.ceiling_pct;
-  const float feed =
-      inverse_exponent_ == 1.0F ? limited : power_of_feed(limited, inverse_exponent_);
+  const float feed = inverse_exponent_ == 1.0F ? limited : feed_power(limited, inverse_exponent_);
   return std::clamp(100.0F * feed, config_.floor_pct, config_.ceiling_pct);
 }
 
