@@ -149,14 +149,22 @@ float PathMap::slowest(const Question& question, float scale_pct) const noexcept
   const float reach_s =
       0.01F * question.override_pct * (config_.period_s + brake_s) + kMargin_s + kCell_s;
   const std::size_t last = index_of(begin_s + reach_s);
+  // Most cells ask for no less, which their whole number tells: nothing known is the highest.
+  const auto enough = [scale_pct](float pct) {
+    return static_cast<std::uint32_t>(std::min(65534.0F, pct / scale_pct + 1.0F));
+  };
   float lowest_pct = question.override_pct;
+  std::uint32_t highest = enough(lowest_pct);
   for (std::size_t cell = index_of(begin_s - kBehind_s); cell <= last; ++cell) {
-    const std::uint16_t known = s.learned[cell];
-    if (known == 0 || known == kFree) continue;
+    const std::uint32_t known = s.learned[cell];
+    if (known - 1U >= highest) continue;
     const float there_pct = scale_pct * static_cast<float>(known);
     const float way_s = static_cast<float>(cell) * kCell_s - begin_s - kMargin_s;
     const float here_pct = (100.0F * way_s + brake_s * there_pct) * per_brake_1_s;
-    lowest_pct = std::min(lowest_pct, std::max(there_pct, here_pct));
+    const float allowed_pct = std::max(there_pct, here_pct);
+    if (allowed_pct >= lowest_pct) continue;
+    lowest_pct = allowed_pct;
+    highest = enough(lowest_pct);
   }
   return lowest_pct;
 }
