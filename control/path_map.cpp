@@ -151,7 +151,7 @@ float PathMap::slowest(const Question& question, float scale_pct) const noexcept
   const std::size_t last = index_of(begin_s + reach_s);
   // Most cells ask for no less, which their whole number tells: nothing known is the highest.
   const auto enough = [scale_pct](float pct) {
-    return static_cast<std::uint32_t>(std::min(65534.0F, pct / scale_pct + 1.0F));
+    return static_cast<std::uint32_t>(std::min(65534.0F, std::max(0.0F, pct / scale_pct + 1.0F)));
   };
   float lowest_pct = question.override_pct;
   std::uint32_t highest = enough(lowest_pct);
