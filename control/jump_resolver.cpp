@@ -135,12 +135,13 @@ void JumpResolver::conclude(Fits& fits, ForceBelief& belief) const noexcept {
 void JumpResolver::begin(const Point& past, const Reading& now, float memory_n,
                          ForceBelief& belief) noexcept {
   state_.restarts = 0;
-  start(past, now, memory_n, belief);
+  Fits fits;
+  start(past, now, memory_n, fits, belief);
 }
 
 // The two readings that there are since the jump, in one pass: the moments of the first tick have
 // both, those of the second have the second alone.
-void JumpResolver::start(const Point& past, const Reading& now, float memory_n,
+void JumpResolver::start(const Point& past, const Reading& now, float memory_n, Fits& fits,
                          ForceBelief& belief) noexcept {
   State& s = state_;
   s.base = past;
@@ -160,7 +161,6 @@ void JumpResolver::start(const Point& past, const Reading& now, float memory_n,
                                       belief.gain_n);
   const Residual second = advance_base(now, belief.gain_n);
   const float misfit = s.prior_misfit + s.residual;
-  Fits fits;
   float least = s.residual;
   const float push = left_ * now.feed;
   const float sensed_push = lag_.sensed_input * now.feed;
@@ -219,7 +219,7 @@ auto JumpResolver::follow(const Point& past, const Reading& now, float memory_n,
     s.samples = 0;
     return Outcome::kGivesUp;
   }
-  start(past, now, memory_n, belief);
+  start(past, now, memory_n, fits, belief);
   return Outcome::kBeginsAgain;
 }
 

@@ -117,7 +117,7 @@ class JumpResolver {
     std::array<Fit, kMoments> of;
     float least;  // misfit of the best, "nothing happened" among them
   };
-  struct Residual {  // of a reading from the open loop
+  struct Residual {   // of a reading from the open loop
     float sharpness;  // 1 / R
     float pull;       // r / R
   };
@@ -125,7 +125,8 @@ class JumpResolver {
     float force;
     float sensed;
   };
-  void start(const Point& past, const Reading& now, float memory_n, ForceBelief& belief) noexcept;
+  void start(const Point& past, const Reading& now, float memory_n, Fits& fits,
+             ForceBelief& belief) noexcept;
   [[nodiscard]] Residual advance_base(const Reading& reading, float gain_n) noexcept;
   static void fit(const Moment& moment, float misfit, Fit& fit, float& least) noexcept;
   void conclude(Fits& fits, ForceBelief& belief) const noexcept;
