@@ -84,12 +84,14 @@ class LatencyBank {
  private:
   explicit LatencyBank(const Config& config) noexcept;
   [[nodiscard]] float candidate_s(std::size_t k) const noexcept;
-  [[nodiscard]] float advance(Chain& chain, float latency_s,
+  [[nodiscard]] float advance(Chain& chain, float ticks,
                               std::span<const float> sent) const noexcept;
   void judge(std::size_t best) noexcept;
 
   Config config_;
   LagStep tick_;
+  float grid_ticks_;  // from one candidate to the next
+  float share_;       // of a tick in the misfits
   State state_{};
 };
 
