@@ -5,21 +5,6 @@
 #include "estimator/torque_path_parts.hpp"
 
 namespace cutforce::estimator {
-auto TorquePath::make(const Config& config) noexcept -> std::expected<TorquePath, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return TorquePath{config};
-}
-
-TorquePath::TorquePath(const Config& config) noexcept
-    : config_(config),
-      blocks_{.power = *AirGapPower::make(config.power),
-              .synchronous = *SynchronousSpeed::make(config.synchronous),
-              .meter = *MeasuredPower::make(config.meter),
-              .drive = *DriveModel::make(config.drive),
-              .friction = *LoadFriction::make(config.load_friction),
-              .tare = *IdleTare::make(config.tare),
-              .monitor = *SynthesizedMonitor::make(config.monitor)} {}
-
 void TorquePath::restart() noexcept {
   blocks_.power.restart();
   blocks_.synchronous.restart();
