@@ -36,39 +36,6 @@ template <class L>
 
 }  // namespace
 
-auto LawSet::Config::check() const noexcept -> std::expected<void, ConfigError> {
-  const auto fail = [](ConfigError error) { return std::unexpected{error}; };
-  if (static_cast<std::size_t>(in_charge) >= kLawCount) return fail(ConfigError::kInCharge);
-  if (!pi.check()) return fail(ConfigError::kPi);
-  if (!pid.check()) return fail(ConfigError::kPid);
-  if (!pole_assignment.check()) return fail(ConfigError::kPoleAssignment);
-  if (!mrac.check()) return fail(ConfigError::kMrac);
-  if (!variable_gain.check()) return fail(ConfigError::kVariableGain);
-  if (!fuzzy.check()) return fail(ConfigError::kFuzzy);
-  if (!predictive.check()) return fail(ConfigError::kPredictive);
-  for (const float other_s : {pi.period_s, pid.period_s, pole_assignment.period_s, mrac.period_s,
-                              variable_gain.period_s, fuzzy.period_s, predictive.period_s}) {
-    if (!(other_s >= period_s && other_s <= period_s)) return fail(ConfigError::kPeriods);
-  }
-  return {};
-}
-
-LawSet::LawSet(const Config& config) noexcept
-    : config_(config),
-      pi_(*PiController::make(config.pi)),
-      pid_(*Pid::make(config.pid)),
-      pole_assignment_(*PoleAssignment::make(config.pole_assignment)),
-      mrac_(*Mrac::make(config.mrac)),
-      variable_gain_(*VariableGain::make(config.variable_gain)),
-      fuzzy_(*FuzzyPi::make(config.fuzzy)),
-      predictive_(Predictive::make_checked(config.predictive)),
-      in_charge_(config.in_charge) {}
-
-auto LawSet::make(const Config& config) noexcept -> std::expected<LawSet, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return LawSet{config};
-}
-
 auto LawSet::step(const Input& input) noexcept -> Output {
   if (joining_ && input.mode == LawMode::kHold) return law_answer(input.override_applied_pct);
   if (joining_) join(input);

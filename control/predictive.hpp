@@ -64,7 +64,7 @@ class Predictive {
     bool learns;             // from one part to the next; needs the start of each
     bool finds_latency;      // while cutting: a commissioning step
 
-    [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
   };
 
   using Input = LawInput;
@@ -98,9 +98,10 @@ class Predictive {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static std::expected<Predictive, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<Predictive, ConfigError> make(
+      const Config& config) noexcept;
   // Of a config that make() accepts, made where it stays: 5 kB do not pass over a stack.
-  [[nodiscard]] static Predictive make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr Predictive make_checked(const Config& config) noexcept {
     return Predictive{config};
   }
 
@@ -113,7 +114,7 @@ class Predictive {
   void restore(const State& state) noexcept;
 
  private:
-  explicit Predictive(const Config& config) noexcept;
+  explicit constexpr Predictive(const Config& config) noexcept;
 
   struct Forecast {
     float force_n;  // at the end of the dead time
@@ -141,7 +142,7 @@ class Predictive {
   [[nodiscard]] float wanted_pct(const Forecast& ahead, const Horizon& horizon,
                                  float reference_n) const noexcept;
   void doubt_timing(const GainTracker::Output& seen) noexcept;
-  void assume_latency(float latency_s) noexcept;
+  constexpr void assume_latency(float latency_s) noexcept;
   void find_latency(const Input& input, bool jumped) noexcept;
   [[nodiscard]] float feed_ratio(float w) noexcept;
   [[nodiscard]] const float* sent() const noexcept { return &own_.sent[own_.newest]; }
@@ -170,3 +171,5 @@ class Predictive {
 };
 
 }  // namespace cutforce::control
+
+#include "control/predictive_make.hpp"  // IWYU pragma: export
