@@ -30,38 +30,6 @@ hal::Sample with_third_phase(hal::Sample sample) noexcept {
 
 }  // namespace
 
-Board::Board(const Config& config) noexcept
-    : config_{.samples_by_can = config.samples_by_can,
-              .node = config.node,
-              .code = config.loop.controller.code,
-              .supervisor_period_s = config.supervisor.period_s,
-              .force_reference_n = config.force_reference_n,
-              .force_limit_n = config.force_limit_n,
-              .sample_period_ns = config.sample_period_ns},
-      loop_(ControlLoop::make_checked(config.loop)),
-      supervisor_(*Supervisor::make(config.supervisor)),
-      assembler_(*hal::can::SampleAssembler::make(config.assembler)),
-      link_(config.node),
-      report_(config.node) {
-  supervision_.override_pct = loop_.command().override_pct;
-}
-
-auto Board::Config::check() const noexcept -> std::expected<void, ConfigError> {
-  if (!loop.check()) return std::unexpected{ConfigError::kLoop};
-  if (!supervisor.check()) return std::unexpected{ConfigError::kSupervisor};
-  if (!assembler.check() || sample_period_ns <= 0) return std::unexpected{ConfigError::kAssembler};
-  if (node < 1 || node > 127) return std::unexpected{ConfigError::kNode};
-  const bool limited = force_limit_n > 0.0F;
-  if (!(force_limit_n >= 0.0F) || (limited && !(force_limit_n > force_reference_n)))
-    return std::unexpected{ConfigError::kForceLimit};
-  return {};
-}
-
-auto Board::make(const Config& config) noexcept -> std::expected<Board, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return Board{config};
-}
-
 auto Board::receive(const hal::can::Frame& frame, std::int64_t now_ns) noexcept
     -> std::optional<LoopOutput> {
   if (config_.samples_by_can && !frame.own) {

@@ -64,7 +64,7 @@ class Board {
     float force_limit_n;  // above the reference; 0: none
     std::int64_t sample_period_ns;
 
-    [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
   };
 
   // Without a sample for so long, the clock goes on for them.
@@ -75,9 +75,12 @@ class Board {
 
   // Fails iff check() does: a part refuses its config, the node is not 1..127, or the limit is not
   // above the reference.
-  [[nodiscard]] static std::expected<Board, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<Board, ConfigError> make(
+      const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays: 10 kB do not pass over a small stack.
-  [[nodiscard]] static Board make_checked(const Config& config) noexcept { return Board{config}; }
+  [[nodiscard]] static constexpr Board make_checked(const Config& config) noexcept {
+    return Board{config};
+  }
 
   // On a bus where nobody answers, nothing is heard of the board either.
   [[nodiscard]] static constexpr bool is_down(const hal::BusStatus& bus) noexcept {
@@ -131,7 +134,7 @@ class Board {
     BoardHealth health{};
   };
 
-  explicit Board(const Config& config) noexcept;
+  explicit constexpr Board(const Config& config) noexcept;
 
   [[nodiscard]] std::optional<LoopOutput> run_loop(hal::Sample sample,
                                                    std::int64_t now_ns) noexcept;
@@ -168,6 +171,38 @@ class Board {
   control::Supervisor::Output supervision_{};
   Own own_{};
 };
+constexpr Board::Board(const Config& config) noexcept
+    : config_{.samples_by_can = config.samples_by_can,
+              .node = config.node,
+              .code = config.loop.controller.code,
+              .supervisor_period_s = config.supervisor.period_s,
+              .force_reference_n = config.force_reference_n,
+              .force_limit_n = config.force_limit_n,
+              .sample_period_ns = config.sample_period_ns},
+      loop_(ControlLoop::make_checked(config.loop)),
+      supervisor_(*control::Supervisor::make(config.supervisor)),
+      assembler_(*hal::can::SampleAssembler::make(config.assembler)),
+      link_(config.node),
+      report_(config.node) {
+  supervision_.override_pct = loop_.command().override_pct;
+}
+
+constexpr auto Board::Config::check() const noexcept -> std::expected<void, ConfigError> {
+  if (!loop.check()) return std::unexpected{ConfigError::kLoop};
+  if (!supervisor.check()) return std::unexpected{ConfigError::kSupervisor};
+  if (!assembler.check() || sample_period_ns <= 0) return std::unexpected{ConfigError::kAssembler};
+  if (node < 1 || node > 127) return std::unexpected{ConfigError::kNode};
+  const bool limited = force_limit_n > 0.0F;
+  if (!(force_limit_n >= 0.0F) || (limited && !(force_limit_n > force_reference_n)))
+    return std::unexpected{ConfigError::kForceLimit};
+  return {};
+}
+
+constexpr auto Board::make(const Config& config) noexcept -> std::expected<Board, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return Board{config};
+}
+
 static_assert(std::is_trivially_copyable_v<Board>);
 
 }  // namespace cutforce::firmware

@@ -11,12 +11,6 @@ std::int64_t divided_down(std::int64_t value, std::int64_t by) noexcept {
 
 }  // namespace
 
-std::expected<SampleAssembler, SampleAssembler::ConfigError> SampleAssembler::make(
-    const Config& config) noexcept {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return SampleAssembler{config};
-}
-
 // By how many samples the count went on: of the numbers that fit its 8 bits, the one nearest to
 // the time that went by. But a frame that follows the last one by one is taken at its word while
 // that is at all possible: frames come late in crowds more often than 256 of them are lost.
