@@ -4,42 +4,41 @@
 
 namespace cutforce::control {
 
-// The visitor sees the law in charge and that law's config.
+auto LawSet::make(const Config& config) noexcept -> std::expected<LawSet, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return LawSet{config};
+}
+
 template <class Set, class Visitor>
 auto LawSet::visit(Set& set, const Visitor& visitor) {
   switch (set.in_charge_) {
     case LawName::kPi:
       break;
     case LawName::kPid:
-      return visitor(set.pid_, set.config_.pid);
+      return visitor(set.pid_);
     case LawName::kPoleAssignment:
-      return visitor(set.pole_assignment_, set.config_.pole_assignment);
+      return visitor(set.pole_assignment_);
     case LawName::kMrac:
-      return visitor(set.mrac_, set.config_.mrac);
+      return visitor(set.mrac_);
     case LawName::kVariableGain:
-      return visitor(set.variable_gain_, set.config_.variable_gain);
+      return visitor(set.variable_gain_);
     case LawName::kFuzzy:
-      return visitor(set.fuzzy_, set.config_.fuzzy);
+      return visitor(set.fuzzy_);
     case LawName::kPredictive:
-      return visitor(set.predictive_, set.config_.predictive);
+      return visitor(set.predictive_);
   }
-  return visitor(set.pi_, set.config_.pi);
+  return visitor(set.pi_);
 }
-
-namespace {
-
-// Apart, so that the copy is not on the stack below a step of the deepest law.
-template <class L>
-[[gnu::noinline]] void start_anew(L& law, const typename L::Config& config) noexcept {
-  law = *L::make(config);
-}
-
-}  // namespace
 
 auto LawSet::step(const Input& input) noexcept -> Output {
   if (joining_ && input.mode == LawMode::kHold) return law_answer(input.override_applied_pct);
   if (joining_) join(input);
-  return visit(*this, [&](auto& law, const auto& /*config*/) { return law.step(input); });
+  return step_in_charge(input);
+}
+
+// Apart: joining steps too, and each law's step is to be in the image once.
+[[gnu::noinline]] auto LawSet::step_in_charge(const Input& input) noexcept -> Output {
+  return visit(*this, [&input](auto& law) { return law.step(input); });
 }
 
 void LawSet::join(const Input& input) noexcept {
@@ -47,14 +46,8 @@ void LawSet::join(const Input& input) noexcept {
   Input still = input;
   still.mode = LawMode::kTrack;
   still.part_start = false;
-  visit(*this, [&still](auto& law, const auto& config) {
-    if constexpr (requires { law.rejoin(); }) {
-      law.rejoin();
-    } else {
-      start_anew(law, config);
-    }
-    for (int k = 0; k < kCatchUpTicks; ++k) std::ignore = law.step(still);
-  });
+  visit(*this, [](auto& law) { law.rejoin(); });
+  for (int k = 0; k < kCatchUpTicks; ++k) std::ignore = step_in_charge(still);
 }
 
 void LawSet::select(LawName name) noexcept {
@@ -64,8 +57,7 @@ void LawSet::select(LawName name) noexcept {
 }
 
 bool LawSet::foresees() const noexcept {
-  return visit(*this,
-               [](const auto& law, const auto& /*config*/) { return control::foresees(law); });
+  return visit(*this, [](const auto& law) { return control::foresees(law); });
 }
 
 auto LawSet::state() const noexcept -> State {

@@ -2,14 +2,14 @@
 //
 // Only the law in charge runs, so the others cost memory and no time. A law that is put in charge
 // joins at the first tick with a fresh force; until then the override stays where the path leaves
-// it. Joining, it starts as make() left it, is shown the tick `kCatchUpTicks` times in kTrack, as
+// it. Joining, it starts anew, is shown the tick `kCatchUpTicks` times in kTrack, as
 // if the cut had stood like this, and then takes part in the tick as the path wants. What
 // differences and filters remember has then become the present, and what learns the process has
 // seen it. So the override moves by the new law's own step from a cut at rest, and by nothing else
 // (law.hpp: following is bumpless).
 //
-// A law that keeps what it learned while another was in charge, a map of the part for one, has
-// `void rejoin() noexcept`: it is called instead of starting anew.
+// A law of the set says with `void rejoin() noexcept` what starting anew is: to be as make() left
+// it, or to keep what it learned while another was in charge, a map of the part for one.
 #pragma once
 
 #include <cstddef>
@@ -86,8 +86,7 @@ class LawSet {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static constexpr std::expected<LawSet, ConfigError> make(
-      const Config& config) noexcept;
+  [[nodiscard]] static std::expected<LawSet, ConfigError> make(const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays.
   [[nodiscard]] static constexpr LawSet make_checked(const Config& config) noexcept {
     return LawSet{config};
@@ -108,10 +107,10 @@ class LawSet {
   explicit constexpr LawSet(const Config& config) noexcept;
 
   void join(const Input& input) noexcept;
+  [[nodiscard]] Output step_in_charge(const Input& input) noexcept;
   template <class Set, class Visitor>
   static auto visit(Set& set, const Visitor& visitor);
 
-  Config config_;
   PiController pi_;
   Pid pid_;
   PoleAssignment pole_assignment_;
@@ -147,14 +146,8 @@ static_assert(sizeof(LawSet::State) == sizeof(PiController::State) + sizeof(Pid:
                                            sizeof(VariableGain::State) + sizeof(FuzzyPi::State) +
                                            sizeof(Predictive::State) + 2 * 4);
 
-constexpr auto LawSet::make(const Config& config) noexcept -> std::expected<LawSet, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return LawSet{config};
-}
-
 constexpr LawSet::LawSet(const Config& config) noexcept
-    : config_(config),
-      pi_(*PiController::make(config.pi)),
+    : pi_(*PiController::make(config.pi)),
       pid_(*Pid::make(config.pid)),
       pole_assignment_(*PoleAssignment::make(config.pole_assignment)),
       mrac_(*Mrac::make(config.mrac)),

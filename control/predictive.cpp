@@ -21,6 +21,14 @@ constexpr float kOdd = -1.0F;    // a reading this low (standard deviations) is 
 
 }  // namespace
 
+auto Predictive::make(const Config& config) noexcept -> std::expected<Predictive, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  if (!detail::tracker_config(config).check() || !detail::map_config(config).check())
+    return std::unexpected{ConfigError::kGain};
+  if (!detail::bank_config(config).check()) return std::unexpected{ConfigError::kLatency};
+  return Predictive{config};
+}
+
 void Predictive::find_latency(const Input& input, bool jumped) noexcept {
   const bool usable = input.phase == CutPhase::kCut && !jumped &&
                       input.force_n > kTelling_ratio * input.force_reference_n;

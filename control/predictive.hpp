@@ -98,8 +98,7 @@ class Predictive {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static constexpr std::expected<Predictive, ConfigError> make(
-      const Config& config) noexcept;
+  [[nodiscard]] static std::expected<Predictive, ConfigError> make(const Config& config) noexcept;
   // Of a config that make() accepts, made where it stays: 5 kB do not pass over a stack.
   [[nodiscard]] static constexpr Predictive make_checked(const Config& config) noexcept {
     return Predictive{config};

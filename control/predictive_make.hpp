@@ -51,15 +51,6 @@ inline constexpr float kMostTicks = static_cast<float>(Predictive::kHistory - 2)
 
 }  // namespace detail
 
-constexpr auto Predictive::make(const Config& config) noexcept
-    -> std::expected<Predictive, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  if (!detail::tracker_config(config).check() || !detail::map_config(config).check())
-    return std::unexpected{ConfigError::kGain};
-  if (!detail::bank_config(config).check()) return std::unexpected{ConfigError::kLatency};
-  return Predictive{config};
-}
-
 constexpr Predictive::Predictive(const Config& config) noexcept
     : config_(config),
       tracker_(GainTracker::make_checked(detail::tracker_config(config))),

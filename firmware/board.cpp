@@ -30,6 +30,11 @@ hal::Sample with_third_phase(hal::Sample sample) noexcept {
 
 }  // namespace
 
+auto Board::make(const Config& config) noexcept -> std::expected<Board, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return Board{config};
+}
+
 auto Board::receive(const hal::can::Frame& frame, std::int64_t now_ns) noexcept
     -> std::optional<LoopOutput> {
   if (config_.samples_by_can && !frame.own) {

@@ -75,8 +75,7 @@ class Board {
 
   // Fails iff check() does: a part refuses its config, the node is not 1..127, or the limit is not
   // above the reference.
-  [[nodiscard]] static constexpr std::expected<Board, ConfigError> make(
-      const Config& config) noexcept;
+  [[nodiscard]] static std::expected<Board, ConfigError> make(const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays: 10 kB do not pass over a small stack.
   [[nodiscard]] static constexpr Board make_checked(const Config& config) noexcept {
     return Board{config};
@@ -196,11 +195,6 @@ constexpr auto Board::Config::check() const noexcept -> std::expected<void, Conf
   if (!(force_limit_n >= 0.0F) || (limited && !(force_limit_n > force_reference_n)))
     return std::unexpected{ConfigError::kForceLimit};
   return {};
-}
-
-constexpr auto Board::make(const Config& config) noexcept -> std::expected<Board, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return Board{config};
 }
 
 static_assert(std::is_trivially_copyable_v<Board>);

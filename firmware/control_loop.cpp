@@ -8,6 +8,11 @@ using hal::Signal;
 
 }  // namespace
 
+auto ControlLoop::make(const Config& config) noexcept -> std::expected<ControlLoop, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return ControlLoop{config};
+}
+
 auto ControlLoop::state() const noexcept -> State {
   return {.gate = gate_.state(),
           .front_end = front_end_.state(),

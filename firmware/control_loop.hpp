@@ -125,8 +125,7 @@ class ControlLoop {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static constexpr std::expected<ControlLoop, ConfigError> make(
-      const Config& config) noexcept;
+  [[nodiscard]] static std::expected<ControlLoop, ConfigError> make(const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays: 9 kB do not pass over a small stack.
   [[nodiscard]] static constexpr ControlLoop make_checked(const Config& config) noexcept {
     return ControlLoop{config};

@@ -63,10 +63,4 @@ constexpr auto ControlLoop::Config::check() const noexcept -> std::expected<void
   return {};
 }
 
-constexpr auto ControlLoop::make(const Config& config) noexcept
-    -> std::expected<ControlLoop, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return ControlLoop{config};
-}
-
 }  // namespace cutforce::firmware
