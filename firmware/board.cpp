@@ -13,8 +13,8 @@ using hal::can::identifier;
 constexpr std::int64_t kRateWindow_ns = 500'000'000;
 // A rate that is wrong in the machine file is wrong by a factor; the board's clock is jittery.
 constexpr float kRateTolerance_ratio = 0.1F;
-constexpr float kTurning_rad_s = 1.0F;         // slower is standing still, and noise
-constexpr std::int64_t kMostClockSteps = 100;  // after a stall; the rest of the time is forgotten
+constexpr float kTurning_rad_s = 1.0F;  // slower is standing still, and noise
+constexpr int kMostClockSteps = 100;    // after a stall; the rest of the time is forgotten
 
 // Two voltages of three sum to minus the third: exactly between the lines, and to the neutral of a
 // motor with three wires but for what drives no current.
@@ -138,7 +138,7 @@ bool Board::checks_done() const noexcept {
 
 bool Board::checks_passed() const noexcept {
   if (!own_.health.ports_open || (own_.health.has_bus && is_down(own_.health.bus))) return false;
-  const float expected_hz = 1e9F / static_cast<float>(config_.sample_period_ns);
+  const float expected_hz = config_.sample_rate_hz;
   return own_.rate_hz > (1.0F - kRateTolerance_ratio) * expected_hz &&
          own_.rate_hz < (1.0F + kRateTolerance_ratio) * expected_hz;
 }
@@ -229,12 +229,12 @@ auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> Boa
     own_.started = 1;
     own_.supervised_ns = own_.began_ns = own_.now_ns = now_ns;
   }
-  const auto step_ns = static_cast<std::int64_t>(config_.supervisor_period_s * 1e9F + 0.5F);
   if (at_once) supervise(nullptr);
-  if (now_ns - own_.supervised_ns > kSilence_ns) {
-    std::int64_t steps = (now_ns - own_.supervised_ns - kSilence_ns) / step_ns;
-    own_.supervised_ns += steps * step_ns;
-    for (steps = std::min(steps, kMostClockSteps); steps > 0; --steps) supervise(nullptr);
+  std::int64_t behind_ns = now_ns - own_.supervised_ns - kSilence_ns;
+  for (int steps = 0; behind_ns >= config_.supervisor_step_ns; ++steps) {
+    behind_ns = steps < kMostClockSteps ? behind_ns - config_.supervisor_step_ns : 0;
+    own_.supervised_ns = now_ns - kSilence_ns - behind_ns;
+    if (steps < kMostClockSteps) supervise(nullptr);
   }
   own_.now_ns = now_ns;
 

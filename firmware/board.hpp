@@ -158,7 +158,8 @@ class Board {
     float supervisor_period_s;
     float force_reference_n;
     float force_limit_n;
-    std::int64_t sample_period_ns;
+    float sample_rate_hz;
+    std::int64_t supervisor_step_ns;
   };
 
   Settings config_;
@@ -177,7 +178,9 @@ constexpr Board::Board(const Config& config) noexcept
               .supervisor_period_s = config.supervisor.period_s,
               .force_reference_n = config.force_reference_n,
               .force_limit_n = config.force_limit_n,
-              .sample_period_ns = config.sample_period_ns},
+              .sample_rate_hz = 1e9F / static_cast<float>(config.sample_period_ns),
+              .supervisor_step_ns =
+                  static_cast<std::int64_t>(config.supervisor.period_s * 1e9F + 0.5F)},
       loop_(ControlLoop::make_checked(config.loop)),
       supervisor_(*control::Supervisor::make(config.supervisor)),
       assembler_(*hal::can::SampleAssembler::make(config.assembler)),
