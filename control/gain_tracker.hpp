@@ -133,7 +133,7 @@ class GainTracker {
   void coast(float feed) noexcept;
 
   // Another part: only the last gain is remembered.
-  void restart() noexcept;
+  [[gnu::cold]] void restart() noexcept;
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
   void restore(const State& state) noexcept { state_ = state; }
@@ -145,7 +145,7 @@ class GainTracker {
 
   void predict(float feed, float feed_sigma, float drift) noexcept;
   void correct(float innovation_n, float variance_n2) noexcept;
-  void begin_jump(const Input& input, float noise_n2) noexcept;
+  [[gnu::cold]] void begin_jump(const Input& input, float noise_n2) noexcept;
   void follow(float feed, float feed_sigma, float reading_n, float noise_n2,
               std::uint32_t tick) noexcept;
   struct Fit {
@@ -154,14 +154,14 @@ class GainTracker {
     float misfit;     // sum of r^2 / R, with the prior's share
   };
   using Fits = std::array<Fit, kMoments>;
-  [[nodiscard]] Fits fit_moments() noexcept;
-  void conclude(const Fits& fits) noexcept;
-  [[nodiscard]] bool follow_on(const Input& input, float noise_n2) noexcept;
+  [[nodiscard]] [[gnu::cold]] Fits fit_moments() noexcept;
+  [[gnu::cold]] void conclude(const Fits& fits) noexcept;
+  [[nodiscard]] [[gnu::cold]] bool follow_on(const Input& input, float noise_n2) noexcept;
   [[nodiscard]] bool surprises(const Input& input, float innovation,
                                float innovation_n) const noexcept;
   void note_calm(float innovation, float trend) noexcept;
-  void begin(const Input& input) noexcept;
-  constexpr void settle_in_air() noexcept;
+  [[gnu::cold]] void begin(const Input& input) noexcept;
+  [[gnu::cold]] constexpr void settle_in_air() noexcept;
 
   Config config_;
   LagStep lag_;

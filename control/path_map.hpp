@@ -102,7 +102,7 @@ class PathMap {
   }
 
   // A part begins: what the last one taught is kept.
-  void start() noexcept;
+  [[gnu::cold]] void start() noexcept;
   // Nobody knows where the tool is: nothing is learned or limited until the next part begins.
   void lose_place() noexcept {
     state_.written = 0;
@@ -129,7 +129,7 @@ class PathMap {
 
   [[nodiscard]] float feed_at_reference(float gain_n) const noexcept;
   void write_to(float position_s, std::uint16_t cell) noexcept;
-  void believe(std::uint32_t cell, std::uint32_t count) noexcept;
+  [[gnu::cold]] void believe(std::uint32_t cell, std::uint32_t count) noexcept;
   void merge(std::uint32_t cell, std::uint32_t sum, std::uint32_t count) noexcept;
   void follow_wear(float feed_now, float feed_then) noexcept;
   [[nodiscard]] float slowest(const Question& question, float scale_pct) const noexcept;

@@ -107,7 +107,7 @@ class Predictive {
   [[nodiscard]] Output step(const Input& input) noexcept;
   // In charge again after another law: what was learned of parts and of the dead time stays, but
   // nothing of this part, whose path nobody followed.
-  void rejoin() noexcept;
+  [[gnu::cold]] void rejoin() noexcept;
 
   [[nodiscard]] State state() const noexcept;
   void restore(const State& state) noexcept;
@@ -141,7 +141,7 @@ class Predictive {
   [[nodiscard]] float wanted_pct(const Forecast& ahead, const Horizon& horizon,
                                  float reference_n) const noexcept;
   void doubt_timing(const GainTracker::Output& seen) noexcept;
-  constexpr void assume_latency(float latency_s) noexcept;
+  [[gnu::cold]] constexpr void assume_latency(float latency_s) noexcept;
   void find_latency(const Input& input, bool jumped) noexcept;
   [[nodiscard]] float feed_ratio(float w) noexcept;
   [[nodiscard]] const float* sent() const noexcept { return &own_.sent[own_.newest]; }
