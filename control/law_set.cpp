@@ -30,23 +30,54 @@ auto LawSet::visit(Set& set, const Visitor& visitor) {
   return visitor(set.pi_);
 }
 
+namespace {
+
+// A function for each law: what one of them keeps on the stack is not below another.
+template <class L>
+[[gnu::noinline]] LawOutput step_apart(L& law, const LawInput& input) noexcept {
+  return law.step(input);
+}
+
+}  // namespace
+
 auto LawSet::step(const Input& input) noexcept -> Output {
   if (joining_ && input.mode == LawMode::kHold) return law_answer(input.override_applied_pct);
   if (joining_) join(input);
   return step_in_charge(input);
 }
 
-// Apart: joining steps too, and each law's step is to be in the image once.
+// Joining steps too, and each law's step is to be in the image once. Not by visit(): what it
+// answers with would be copied.
 [[gnu::noinline]] auto LawSet::step_in_charge(const Input& input) noexcept -> Output {
-  return visit(*this, [&input](auto& law) { return law.step(input); });
+  switch (in_charge_) {
+    case LawName::kPi:
+      break;
+    case LawName::kPid:
+      return step_apart(pid_, input);
+    case LawName::kPoleAssignment:
+      return step_apart(pole_assignment_, input);
+    case LawName::kMrac:
+      return step_apart(mrac_, input);
+    case LawName::kVariableGain:
+      return step_apart(variable_gain_, input);
+    case LawName::kFuzzy:
+      return step_apart(fuzzy_, input);
+    case LawName::kPredictive:
+      return step_apart(predictive_, input);
+  }
+  return step_apart(pi_, input);
 }
 
-void LawSet::join(const Input& input) noexcept {
+[[gnu::cold, gnu::noinline]] void LawSet::rejoin_in_charge() noexcept {
+  visit(*this, [](auto& law) { law.rejoin(); });
+}
+
+[[gnu::cold, gnu::noinline]] void LawSet::join(const Input& input) noexcept {
   joining_ = false;
   Input still = input;
   still.mode = LawMode::kTrack;
   still.part_start = false;
-  visit(*this, [](auto& law) { law.rejoin(); });
+  rejoin_in_charge();
   for (int k = 0; k < kCatchUpTicks; ++k) std::ignore = step_in_charge(still);
 }
 

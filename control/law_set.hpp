@@ -107,6 +107,7 @@ class LawSet {
   explicit constexpr LawSet(const Config& config) noexcept;
 
   void join(const Input& input) noexcept;
+  void rejoin_in_charge() noexcept;
   [[nodiscard]] Output step_in_charge(const Input& input) noexcept;
   template <class Set, class Visitor>
   static auto visit(Set& set, const Visitor& visitor);

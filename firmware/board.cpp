@@ -18,14 +18,13 @@ constexpr int kMostClockSteps = 100;    // after a stall; the rest of the time i
 
 // Two voltages of three sum to minus the third: exactly between the lines, and to the neutral of a
 // motor with three wires but for what drives no current.
-hal::Sample with_third_phase(hal::Sample sample) noexcept {
+void add_third_phase(hal::Sample& sample) noexcept {
   using hal::Signal;
   if (!sample.has(Signal::kVoltageW) && sample.has(Signal::kVoltageU) &&
       sample.has(Signal::kVoltageV)) {
     sample.voltage_v[2] = -(sample.voltage_v[0] + sample.voltage_v[1]);
     sample.present |= hal::bit(Signal::kVoltageW);
   }
-  return sample;
 }
 
 }  // namespace
@@ -35,45 +34,50 @@ auto Board::make(const Config& config) noexcept -> std::expected<Board, ConfigEr
   return Board{config};
 }
 
+// Apart, so that the frame's values are not on the stack below the loop.
+[[gnu::noinline]] auto Board::sample_in(const hal::can::Frame& frame, std::int64_t now_ns) noexcept
+    -> std::optional<hal::Sample> {
+  const auto phases = hal::can::unpack<hal::can::Phases>(frame);
+  return phases ? assembler_.take(*phases, now_ns) : std::nullopt;
+}
+
 auto Board::receive(const hal::can::Frame& frame, std::int64_t now_ns) noexcept
-    -> std::optional<LoopOutput> {
+    -> const LoopOutput* {
   if (config_.samples_by_can && !frame.own) {
     if (frame.id == identifier(Base::kPhases, config_.node)) {
-      const auto phases = hal::can::unpack<hal::can::Phases>(frame);
-      const auto taken = phases ? assembler_.take(*phases, now_ns) : std::nullopt;
-      if (!taken) return std::nullopt;
-      return run_loop(*taken, now_ns);
+      auto taken = sample_in(frame, now_ns);
+      return taken ? run_loop(*taken, now_ns) : nullptr;
     }
     if (frame.id == identifier(Base::kSpindle, config_.node)) {
       if (const auto spindle = hal::can::unpack<hal::can::Spindle>(frame))
         assembler_.take(*spindle);
-      return std::nullopt;
+      return nullptr;
     }
   }
   link_.take(frame);
-  return std::nullopt;
+  return nullptr;
 }
 
-auto Board::sample(const hal::Sample& sample, std::int64_t now_ns) noexcept
-    -> std::optional<LoopOutput> {
-  return run_loop(with_third_phase(sample), now_ns);
+auto Board::sample(const hal::Sample& sample, std::int64_t now_ns) noexcept -> const LoopOutput* {
+  hal::Sample whole = sample;
+  add_third_phase(whole);
+  return run_loop(whole, now_ns);
 }
 
-auto Board::run_loop(hal::Sample sample, std::int64_t now_ns) noexcept
-    -> std::optional<LoopOutput> {
+auto Board::run_loop(hal::Sample& sample, std::int64_t now_ns) noexcept -> const LoopOutput* {
   note_rate(now_ns);
   note_turning(sample);
   link_.add_to(sample);
   loop_.permit(permission());
-  std::optional<LoopOutput> output = loop_.step(sample);
-  if (!output) return std::nullopt;
+  const std::optional<LoopOutput> output = loop_.step(sample);
+  if (!output) return nullptr;
   own_.supervised_ns = std::max(own_.supervised_ns, now_ns);
   note_wear(*output);
   supervise(&*output);
-  output->override_pct = static_cast<float>(supervision_.override_pct);
-  output->present |= LoopOutput::kOverride;
   own_.last = *output;
-  return output;
+  own_.last.override_pct = static_cast<float>(supervision_.override_pct);
+  own_.last.present |= LoopOutput::kOverride;
+  return &own_.last;
 }
 
 // The rate by the board's own clock, over windows; what is not a whole window says nothing.

@@ -87,12 +87,12 @@ class Board {
            !bus.acknowledged;
   }
 
-  // A frame that came at `now_ns`; a row of the trace where it ended an estimate period.
-  [[nodiscard]] std::optional<LoopOutput> receive(const hal::can::Frame& frame,
-                                                  std::int64_t now_ns) noexcept;
+  // A frame that came at `now_ns`; a row of the trace where it ended an estimate period, else a
+  // null pointer. The row stays until the next one.
+  [[nodiscard]] const LoopOutput* receive(const hal::can::Frame& frame,
+                                          std::int64_t now_ns) noexcept;
   // A sample from elsewhere than the bus.
-  [[nodiscard]] std::optional<LoopOutput> sample(const hal::Sample& sample,
-                                                 std::int64_t now_ns) noexcept;
+  [[nodiscard]] const LoopOutput* sample(const hal::Sample& sample, std::int64_t now_ns) noexcept;
   // After all that has come since the last tick. `now_ns` does not go back.
   [[nodiscard]] BoardOutput tick(std::int64_t now_ns, const BoardHealth& health) noexcept;
 
@@ -135,8 +135,10 @@ class Board {
 
   explicit constexpr Board(const Config& config) noexcept;
 
-  [[nodiscard]] std::optional<LoopOutput> run_loop(hal::Sample sample,
-                                                   std::int64_t now_ns) noexcept;
+  [[nodiscard]] std::optional<hal::Sample> sample_in(const hal::can::Frame& frame,
+                                                     std::int64_t now_ns) noexcept;
+  // Adds to the sample what the CNC knows better.
+  [[nodiscard]] const LoopOutput* run_loop(hal::Sample& sample, std::int64_t now_ns) noexcept;
   void supervise(const LoopOutput* output) noexcept;
   void note_rate(std::int64_t now_ns) noexcept;
   void note_wear(const LoopOutput& output) noexcept;

@@ -79,6 +79,11 @@ constexpr Board::Config kConfig = board_config(kMachine, kWiring);
 static_assert(kConfig.check(), "the machine that is compiled in is refused");
 constinit Board board = Board::make_checked(kConfig);
 
+constexpr CmsdkTimer<MappedRegisters> kTimer{MappedRegisters{kBoard.timer}, kBoard.clock_hz};
+constinit Pins pins{MappedRegisters{kBoard.pins}, TimerWait{kTimer}, kPins};
+constinit Source source{buffer, scale()};
+constinit Cycle cycle{board, {.bytes = &pins, .source = &source}};
+
 void report(const BoardOutput& output, std::uint32_t missed) {
   console::write("override ");
   console::write_number(output.supervision.override_pct);
@@ -94,11 +99,8 @@ void report(const BoardOutput& output, std::uint32_t missed) {
 }
 
 [[noreturn, gnu::noinline]] void run_board() {
-  CmsdkTimer<MappedRegisters> timer{MappedRegisters{kBoard.timer}, kBoard.clock_hz};
+  auto timer = kTimer;
   timer.start();
-  Pins pins{MappedRegisters{kBoard.pins}, TimerWait{timer}, kPins};
-  Source source{buffer, scale()};
-  static Cycle cycle(board, {.bytes = &pins, .source = &source});
   CmsdkWatchdog<MappedRegisters> watchdog{MappedRegisters{kBoard.watchdog}};
   watchdog.start(kWatchdog_ticks);
   auto system = kSystemControl;
