@@ -15,8 +15,27 @@ constexpr SpaceVector times(SpaceVector a, SpaceVector b) noexcept {
 
 }  // namespace
 
-void FluxTorque::step_apart(const MotorSample& sample, float elapsed_periods) noexcept {
-  const SpaceVector e = emf(sample.voltage_v, sample.current_a);
+void FluxTorque::step_run(std::span<const MotorSample> samples) noexcept {
+  if (samples.empty()) return;
+  if (state_.samples == 0) [[unlikely]] {
+    step(samples.front(), 1.0F);
+    samples = samples.subspan(1);
+    if (samples.empty()) return;
+  }
+  const float leak = state_.leak;
+  const SpaceVector gain_s = state_.gain_s;
+  const float ohm = config_.stator_resistance_ohm;
+  const float torque_scale = torque_scale_;
+  Running r = running();
+  for (const MotorSample& sample : samples) {
+    r.integrate(emf(sample, ohm), leak, gain_s);
+    r.add(sample, torque_scale, 1.0F);
+  }
+  keep(r, samples.back().current_a);
+}
+
+void FluxTorque::step(const MotorSample& sample, float elapsed_periods) noexcept {
+  const SpaceVector e = emf(sample, config_.stator_resistance_ohm);
   Coefficients used{.leak = state_.leak, .gain_s = state_.gain_s};
   bool resolved = true;
   if (elapsed_periods != 1.0F) {
@@ -29,13 +48,14 @@ void FluxTorque::step_apart(const MotorSample& sample, float elapsed_periods) no
     state_.emf_v = e;
     state_.samples = 1;
   }
-  if (resolved) {
-    integrate(e, used.leak, used.gain_s);
-  } else {
+  if (!resolved) {
     state_.emf_v = e;
     seed();
   }
-  add(sample, e, elapsed_periods);
+  Running r = running();
+  if (resolved) r.integrate(e, used.leak, used.gain_s);
+  r.add(sample, torque_scale_, elapsed_periods);
+  keep(r, sample.current_a);
 }
 
 void FluxTorque::seed() noexcept {
@@ -69,7 +89,8 @@ auto FluxTorque::take() noexcept -> Window {
 }
 
 void FluxTorque::remove_offset(SpaceVector voltage_v, SpaceVector current_a) noexcept {
-  const SpaceVector e = emf(voltage_v, current_a);
+  const SpaceVector e =
+      emf({.voltage_v = voltage_v, .current_a = current_a}, config_.stator_resistance_ohm);
   state_.emf_v = {state_.emf_v.alpha - e.alpha, state_.emf_v.beta - e.beta};
   state_.current_a = {state_.current_a.alpha - current_a.alpha,
                       state_.current_a.beta - current_a.beta};

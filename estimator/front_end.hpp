@@ -1,11 +1,11 @@
 // Raw channels to star-equivalent space vectors, amplitude-invariant.
 // Equations (E1)-(E8): estimator/EQUATIONS.md.
 //
-//   x = g (x_raw - o)                                    each channel, g and o from idle
-//   calibration v = (2/3) (v_u - (v_v + v_w)/2) + j (v_v - v_w)/sqrt(3)              line to
-//   neutral v = (v_uv - v_wu)/3 + j v_vw/sqrt(3),   v_wu = -(v_uv + v_vw)        line to line i =
-//   as the first line,                  i_w = -(i_u + i_v)           line currents v <- v exp(-j
-//   w_e t_lead)                            voltages sampled ahead of the currents
+//   x = g (x_raw - o)                                      each channel, by idle calibration
+//   v = (2/3) (v_u - (v_v + v_w)/2) + j (v_v - v_w)/sqrt(3)              line to neutral
+//   v = (v_uv - v_wu)/3 + j v_vw/sqrt(3),   v_wu = -(v_uv + v_vw)        line to line
+//   i = as the first line,                  i_w = -(i_u + i_v)           line currents
+//   v <- v exp(-j w_e t_lead)                          voltages sampled ahead of the currents
 //
 // Assumes a three-wire motor: the zero sequence carries no power and does not appear in a vector.
 // A delta winding needs no other formula, only a third of its phase resistance (E8).
@@ -17,6 +17,7 @@
 #include <array>
 #include <cstdint>
 #include <expected>
+#include <span>
 #include <type_traits>
 
 #include "estimator/polynomials.hpp"
@@ -88,28 +89,49 @@ class FrontEnd {
       const Config& config) noexcept;
 
   [[nodiscard]] Output step(const Input& input) const noexcept {
-    return {.motor = motor(input.voltage_v, input.current_a),
-            .current_residual_a = residual_a(input.current_a)};
+    Output output{.motor = map_.vectors(input.voltage_v, input.current_a),
+                  .current_residual_a = residual_a(input.current_a)};
+    turn({&output.motor, 1});
+    return output;
   }
 
-  // The two parts of step(), for who needs the second only now and then.
-  [[nodiscard]] MotorSample motor(const std::array<float, 3>& v,
-                                  const std::array<float, 3>& i) const noexcept {
-    SpaceVector voltage{// (E5)
-                        map_.va[0] * v[0] + map_.va[1] * v[1] + map_.va[2] * v[2] - map_.va[3],
-                        map_.vb[0] * v[1] + map_.vb[1] * v[2] - map_.vb[2]};
-    if (leads_ != 0) {
-      const SpaceVector r = state_.rotation;
-      voltage = {voltage.alpha * r.alpha - voltage.beta * r.beta,  // (E6)
-                 voltage.alpha * r.beta + voltage.beta * r.alpha};
+  // Rows of the affine map (E5); the last number of each is the offset seen through it.
+  struct Map {
+    std::array<float, 4> va;  // of v_1, v_2, v_3
+    std::array<float, 3> vb;  // of v_2, v_3
+    std::array<float, 4> ia;  // of i_u, i_v, i_w
+    std::array<float, 4> ib;
+
+    [[nodiscard]] MotorSample vectors(const std::array<float, 3>& v,
+                                      const std::array<float, 3>& i) const noexcept {
+      return {.voltage_v = {va[0] * v[0] + va[1] * v[1] + va[2] * v[2] - va[3],
+                            vb[0] * v[1] + vb[1] * v[2] - vb[2]},
+              .current_a = {ia[0] * i[0] + ia[1] * i[1] + ia[2] * i[2] - ia[3],
+                            ib[0] * i[0] + ib[1] * i[1] + ib[2] * i[2] - ib[3]}};
     }
-    return {.voltage_v = voltage,
-            .current_a = {map_.ia[0] * i[0] + map_.ia[1] * i[1] + map_.ia[2] * i[2] - map_.ia[3],
-                          map_.ib[0] * i[0] + map_.ib[1] * i[1] + map_.ib[2] * i[2] - map_.ib[3]}};
+  };
+
+  // The parts of step(), for who needs them at different times: the vectors without the lead, by a
+  // map to keep in registers (number by number: a copy as a whole would go through memory),
+  [[nodiscard, gnu::always_inline]] Map map() const noexcept {
+    const Map& m = map_;
+    return {.va = {m.va[0], m.va[1], m.va[2], m.va[3]},
+            .vb = {m.vb[0], m.vb[1], m.vb[2]},
+            .ia = {m.ia[0], m.ia[1], m.ia[2], m.ia[3]},
+            .ib = {m.ib[0], m.ib[1], m.ib[2], m.ib[3]}};
   }
+  // the lead, where there is one,
+  void turn(std::span<MotorSample> samples) const noexcept {  // (E6)
+    if (leads_ == 0) return;
+    const SpaceVector r = state_.rotation;
+    for (MotorSample& sample : samples) {
+      const SpaceVector v = sample.voltage_v;
+      sample.voltage_v = {v.alpha * r.alpha - v.beta * r.beta, v.alpha * r.beta + v.beta * r.alpha};
+    }
+  }
+  // and what the currents' sum leaves.
   [[nodiscard]] float residual_a(const std::array<float, 3>& i) const noexcept {  // (E7)
-    return map_.residual[0] * i[0] + map_.residual[1] * i[1] + map_.residual[2] * i[2] -
-           map_.residual[3];
+    return residual_[0] * i[0] + residual_[1] * i[1] + residual_[2] * i[2] - residual_[3];
   }
 
   // From the next sample on. Fails as Config::check(); then the old one stays.
@@ -125,15 +147,6 @@ class FrontEnd {
   constexpr void restore(const State& state) noexcept;
 
  private:
-  // Rows of the affine map; the last number of each is the offset seen through it.
-  struct Map {
-    std::array<float, 4> va;  // of v_1, v_2, v_3
-    std::array<float, 3> vb;  // of v_2, v_3
-    std::array<float, 4> ia;  // of i_u, i_v, i_w
-    std::array<float, 4> ib;
-    std::array<float, 4> residual;
-  };
-
   [[nodiscard]] static constexpr std::expected<void, ConfigError> check_calibration(
       const Calibration& calibration) noexcept;
 
@@ -149,6 +162,7 @@ class FrontEnd {
   VoltageChannels voltages_;
   CurrentChannels currents_;
   Map map_{};
+  std::array<float, 4> residual_{};  // of i_u, i_v, i_w, and the offset
   State state_{};
   std::uint32_t leads_ = 0;  // 1: the rotation is one
 };
@@ -243,7 +257,7 @@ constexpr void FrontEnd::fold() noexcept {  // (E5)
   map_.vb = {vb[1], vb[2], vb[3]};
   map_.ia = detail::folded(current.alpha, c.current_gain_ratio, c.current_offset_a);
   map_.ib = detail::folded(current.beta, c.current_gain_ratio, c.current_offset_a);
-  map_.residual = detail::folded(ones, c.current_gain_ratio, c.current_offset_a);
+  residual_ = detail::folded(ones, c.current_gain_ratio, c.current_offset_a);
 }
 
 static_assert(std::is_trivially_copyable_v<FrontEnd>);

@@ -20,6 +20,7 @@
 #include <array>
 #include <cstdint>
 #include <expected>
+#include <span>
 #include <type_traits>
 
 #include "estimator/air_cut.hpp"
@@ -147,18 +148,21 @@ class FusedObserver {
   }
 
   void step(const Sample& sample) noexcept {
-    step(sample.motor, sample.elapsed_periods);
-    if (sample.speed_valid) note_speed(sample.speed_rad_s);
+    flux_.step(sample.motor, sample.elapsed_periods);
+    if (sample.speed_valid) note_speeds(speed_sum_rad_s() + sample.speed_rad_s, 1);
     if (sample.meter_valid) note_meter(sample.power_meter_w);
   }
-  // The same in its parts.
-  [[gnu::always_inline]] void step(const MotorSample& motor, float elapsed_periods) noexcept {
+  // The same in its parts: samples that follow each other by one period, or one that does not,
+  void step_run(std::span<const MotorSample> motor) noexcept { flux_.step_run(motor); }
+  void step(const MotorSample& motor, float elapsed_periods) noexcept {
     flux_.step(motor, elapsed_periods);
   }
-  void note_speed(float speed_rad_s) noexcept {
-    tick_.speed_sum_rad_s += speed_rad_s;
-    ++tick_.speed_count;
+  // the sum of all speeds since the last tick, with `count` new ones in it,
+  void note_speeds(float sum_rad_s, std::uint32_t count) noexcept {
+    tick_.speed_sum_rad_s = sum_rad_s;
+    tick_.speed_count += count;
   }
+  // and the latest reading of the meter.
   void note_meter(float power_w) noexcept {
     tick_.meter_w = power_w;
     tick_.has_meter = 1;

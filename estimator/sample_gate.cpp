@@ -43,7 +43,7 @@ bool usable(const Kind& kind, FaultSet& faults, std::uint32_t& at_end) noexcept 
 
 }  // namespace
 
-auto SampleGate::step_carefully(const Input& input) noexcept -> Output {
+auto SampleGate::step(const Input& input) noexcept -> Output {
   if (state_.started != 0 && not_later(input.time_ns)) {
     FaultSet faults;
     faults.insert(Fault::kTimeOrder);
@@ -104,8 +104,10 @@ void SampleGate::pass_time(const Input& input, Output& output) const noexcept { 
     return;
   }
   // At most 2 s, so 32 bits hold it and the conversion is one instruction everywhere.
-  output.elapsed_periods =
+  const float periods =
       static_cast<float>(static_cast<std::uint32_t>(since)) * limits_.periods_per_ns;
+  output.elapsed_periods =
+      static_cast<float>(static_cast<std::uint32_t>(1024.0F * periods + 0.5F)) * (1.0F / 1024.0F);
   if (!(output.elapsed_periods > 1.5F)) return;
   output.faults.insert(Fault::kGap);
   output.missing_samples = static_cast<std::uint32_t>(output.elapsed_periods + 0.5F) - 1U;

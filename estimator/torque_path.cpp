@@ -5,6 +5,24 @@
 #include "estimator/torque_path_parts.hpp"
 
 namespace cutforce::estimator {
+
+bool TorquePath::add_motor(std::span<const MotorSample> motor) noexcept {
+  const bool power_ends = blocks_.power.add_run(motor, sums_.electrical_rad_s);
+  return blocks_.synchronous.add_run(motor) && power_ends;
+}
+
+bool TorquePath::add(const Input& input) noexcept {
+  const MotorSample motor = input.motor_valid ? input.motor : MotorSample{};
+  add_speed(input.speed_valid ? input.speed_rad_s : 0.0F);
+  if (input.meter_valid) {
+    sums_.meter_w += input.power_meter_w;
+    ++sums_.meter_samples;
+  }
+  if (input.motor_valid) ++sums_.motor_samples;
+  if (input.speed_valid) ++sums_.speed_samples;
+  return add_motor({&motor, 1});
+}
+
 void TorquePath::restart() noexcept {
   blocks_.power.restart();
   blocks_.synchronous.restart();

@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <expected>
 #include <optional>
+#include <span>
 #include <type_traits>
 
 #include "estimator/air_gap_power.hpp"
@@ -142,7 +143,13 @@ class TorquePath {
     return close_window(input.feed);
   }
   // The same in two parts: true with the last sample of a window, which close_window() then ends.
-  [[nodiscard]] [[gnu::always_inline]] bool add(const Input& input) noexcept;
+  [[nodiscard]] bool add(const Input& input) noexcept;
+  // Samples of one window, at most samples_left() of them; `rows` are the same samples, each with
+  // speed_rad_s and power_meter_w, read where they are valid.
+  template <class Row>
+  [[nodiscard]] bool add_run(std::span<const MotorSample> motor, std::span<const Row> rows,
+                             bool speed_valid, bool meter_valid) noexcept;
+  [[nodiscard]] std::uint32_t samples_left() const noexcept { return blocks_.power.samples_left(); }
   [[nodiscard]] Output close_window(Feed feed) noexcept;
 
   // Samples are missing: the window begins anew, what was learned stays.
@@ -181,29 +188,34 @@ class TorquePath {
   [[nodiscard]] float torque_variance(const Window& window, const Load& load,
                                       const Estimate& estimate) const noexcept;
 
+  [[nodiscard]] bool add_motor(std::span<const MotorSample> motor) noexcept;
+  void add_speed(float speed_rad_s) noexcept;
+
   Config config_;
   Blocks blocks_;
   Sums sums_{};
 };
 
-inline bool TorquePath::add(const Input& input) noexcept {
-  const MotorSample motor = input.motor_valid ? input.motor : MotorSample{};
-  const bool power_ends = blocks_.power.add(motor, sums_.electrical_rad_s);
-  const bool ends = blocks_.synchronous.add(motor) && power_ends;
-
-  // Trapezoid, as AirGapPower does.
-  const float speed = input.speed_valid ? input.speed_rad_s : 0.0F;
-  const float before = sums_.continued != 0 ? sums_.last_speed_rad_s : speed;
+// Trapezoid, as AirGapPower does.
+inline void TorquePath::add_speed(float speed_rad_s) noexcept {
+  const float before = sums_.continued != 0 ? sums_.last_speed_rad_s : speed_rad_s;
   sums_.continued = 1;
-  sums_.last_speed_rad_s = speed;
-  sums_.speed_rad_s += 0.5F * (before + speed);
-  if (input.meter_valid) {
-    sums_.meter_w += input.power_meter_w;
-    ++sums_.meter_samples;
+  sums_.last_speed_rad_s = speed_rad_s;
+  sums_.speed_rad_s += 0.5F * (before + speed_rad_s);
+}
+
+template <class Row>
+bool TorquePath::add_run(std::span<const MotorSample> motor, std::span<const Row> rows,
+                         bool speed_valid, bool meter_valid) noexcept {
+  for (const Row& row : rows) add_speed(speed_valid ? row.speed_rad_s : 0.0F);
+  const auto count = static_cast<std::uint32_t>(rows.size());
+  if (meter_valid) {
+    for (const Row& row : rows) sums_.meter_w += row.power_meter_w;
+    sums_.meter_samples += count;
   }
-  if (input.motor_valid) ++sums_.motor_samples;
-  if (input.speed_valid) ++sums_.speed_samples;
-  return ends;
+  sums_.motor_samples += count;
+  if (speed_valid) sums_.speed_samples += count;
+  return add_motor(motor);
 }
 
 constexpr auto TorquePath::make(const Config& config) noexcept

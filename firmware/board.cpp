@@ -20,11 +20,11 @@ constexpr int kMostClockSteps = 100;    // after a stall; the rest of the time i
 // motor with three wires but for what drives no current.
 void add_third_phase(hal::Sample& sample) noexcept {
   using hal::Signal;
-  if (!sample.has(Signal::kVoltageW) && sample.has(Signal::kVoltageU) &&
-      sample.has(Signal::kVoltageV)) {
-    sample.voltage_v[2] = -(sample.voltage_v[0] + sample.voltage_v[1]);
-    sample.present |= hal::bit(Signal::kVoltageW);
-  }
+  constexpr std::uint32_t kTwo = hal::bit(Signal::kVoltageU) | hal::bit(Signal::kVoltageV);
+  constexpr std::uint32_t kThird = hal::bit(Signal::kVoltageW);
+  if ((sample.present & (kTwo | kThird)) != kTwo) return;
+  sample.voltage_v[2] = -(sample.voltage_v[0] + sample.voltage_v[1]);
+  sample.present |= kThird;
 }
 
 }  // namespace
@@ -46,7 +46,10 @@ auto Board::receive(const hal::can::Frame& frame, std::int64_t now_ns) noexcept
   if (config_.samples_by_can && !frame.own) {
     if (frame.id == identifier(Base::kPhases, config_.node)) {
       auto taken = sample_in(frame, now_ns);
-      return taken ? run_loop(*taken, now_ns) : nullptr;
+      if (!taken) return nullptr;
+      complete({&*taken, 1}, now_ns);
+      std::span<const hal::Sample> one(&*taken, 1);
+      return step(one, now_ns);
     }
     if (frame.id == identifier(Base::kSpindle, config_.node)) {
       if (const auto spindle = hal::can::unpack<hal::can::Spindle>(frame))
@@ -58,18 +61,20 @@ auto Board::receive(const hal::can::Frame& frame, std::int64_t now_ns) noexcept
   return nullptr;
 }
 
-auto Board::sample(const hal::Sample& sample, std::int64_t now_ns) noexcept -> const LoopOutput* {
-  hal::Sample whole = sample;
-  add_third_phase(whole);
-  return run_loop(whole, now_ns);
+// What the bus and the board know of the samples, into each of them.
+void Board::complete(std::span<hal::Sample> samples, std::int64_t now_ns) noexcept {
+  note_rate(static_cast<std::uint32_t>(samples.size()), now_ns);
+  for (hal::Sample& sample : samples) {
+    add_third_phase(sample);
+    note_turning(sample);
+  }
+  link_.add_to(samples);
 }
 
-auto Board::run_loop(hal::Sample& sample, std::int64_t now_ns) noexcept -> const LoopOutput* {
-  note_rate(now_ns);
-  note_turning(sample);
-  link_.add_to(sample);
+auto Board::step(std::span<const hal::Sample>& samples, std::int64_t now_ns) noexcept
+    -> const LoopOutput* {
   loop_.permit(permission());
-  const std::optional<LoopOutput> output = loop_.step(sample);
+  const std::optional<LoopOutput> output = loop_.step(samples);
   if (!output) return nullptr;
   own_.supervised_ns = std::max(own_.supervised_ns, now_ns);
   note_wear(*output);
@@ -81,16 +86,19 @@ auto Board::run_loop(hal::Sample& sample, std::int64_t now_ns) noexcept -> const
 }
 
 // The rate by the board's own clock, over windows; what is not a whole window says nothing.
-void Board::note_rate(std::int64_t now_ns) noexcept {
-  ++own_.rate_count;
+void Board::note_rate(std::uint32_t count, std::int64_t now_ns) noexcept {
   const std::int64_t window_ns = now_ns - own_.rate_since_ns;
-  if (own_.rate_since_ns != 0 && window_ns < kRateWindow_ns) return;
+  if (own_.rate_since_ns != 0 && window_ns < kRateWindow_ns) {
+    own_.rate_count += count;
+    return;
+  }
   // The sample that opens a window is not in it.
+  const std::uint32_t counted = own_.rate_count + 1;
   own_.rate_hz = own_.rate_since_ns != 0 && window_ns < 2 * kRateWindow_ns
-                     ? static_cast<float>(own_.rate_count) * 1e9F / static_cast<float>(window_ns)
+                     ? static_cast<float>(counted) * 1e9F / static_cast<float>(window_ns)
                      : 0.0F;
   own_.rate_since_ns = now_ns;
-  own_.rate_count = 0;
+  own_.rate_count = count - 1;
 }
 
 void Board::note_wear(const LoopOutput& output) noexcept {

@@ -16,6 +16,7 @@
 #include <cstdint>
 #include <expected>
 #include <optional>
+#include <span>
 #include <type_traits>
 
 #include "control/override_code.hpp"
@@ -91,8 +92,16 @@ class Board {
   // null pointer. The row stays until the next one.
   [[nodiscard]] const LoopOutput* receive(const hal::can::Frame& frame,
                                           std::int64_t now_ns) noexcept;
-  // A sample from elsewhere than the bus.
-  [[nodiscard]] const LoopOutput* sample(const hal::Sample& sample, std::int64_t now_ns) noexcept;
+  // Samples from elsewhere than the bus, as they lie in the caller's block: what the CNC says is
+  // written into them. `sink` sees each row of the trace.
+  template <class Sink>
+  void samples(std::span<hal::Sample> samples, std::int64_t now_ns, Sink& sink) noexcept {
+    if (samples.empty()) return;
+    complete(samples, now_ns);
+    for (std::span<const hal::Sample> rest = samples; !rest.empty();) {
+      if (const auto row = step(rest, now_ns)) sink(*row);
+    }
+  }
   // After all that has come since the last tick. `now_ns` does not go back.
   [[nodiscard]] BoardOutput tick(std::int64_t now_ns, const BoardHealth& health) noexcept;
 
@@ -137,10 +146,11 @@ class Board {
 
   [[nodiscard]] std::optional<hal::Sample> sample_in(const hal::can::Frame& frame,
                                                      std::int64_t now_ns) noexcept;
-  // Adds to the sample what the CNC knows better.
-  [[nodiscard]] const LoopOutput* run_loop(hal::Sample& sample, std::int64_t now_ns) noexcept;
+  void complete(std::span<hal::Sample> samples, std::int64_t now_ns) noexcept;
+  [[nodiscard]] const LoopOutput* step(std::span<const hal::Sample>& samples,
+                                       std::int64_t now_ns) noexcept;
   void supervise(const LoopOutput* output) noexcept;
-  void note_rate(std::int64_t now_ns) noexcept;
+  void note_rate(std::uint32_t count, std::int64_t now_ns) noexcept;
   void note_wear(const LoopOutput& output) noexcept;
   void note_turning(const hal::Sample& sample) noexcept;
   void note_foreign() noexcept;

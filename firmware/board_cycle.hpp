@@ -84,9 +84,7 @@ class BoardCycle {
     const auto reading = ports_.source->read(samples_);
     if (!reading) return 0;  // samples that stay away are told by their absence
     ++sample_passes_;
-    for (const hal::Sample& sample : std::span(samples_).first(reading->count)) {
-      if (const auto row = board_.sample(sample, now_ns)) sink(*row);
-    }
+    board_.samples(std::span(samples_).first(reading->count), now_ns, sink);
     return reading->lost;
   }
 

@@ -23,7 +23,7 @@ endif()
 set(CUTFORCE_BOARD ${board_${CUTFORCE_CPU}})
 
 set(CMAKE_CXX_FLAGS_INIT
-    "-mcpu=${CUTFORCE_CPU} -mthumb -mfpu=${fpu_${CUTFORCE_CPU}} -mfloat-abi=hard -ffunction-sections -fdata-sections -fno-unwind-tables -fno-asynchronous-unwind-tables -fstack-usage -fcallgraph-info=su")
+    "-mcpu=${CUTFORCE_CPU} -mthumb -mfpu=${fpu_${CUTFORCE_CPU}} -mfloat-abi=hard -ffunction-sections -fdata-sections -fno-unwind-tables -fno-asynchronous-unwind-tables -fstack-usage -fcallgraph-info=su -Wno-psabi")
 
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY NEVER)
