@@ -141,9 +141,9 @@ bool count_control_tick(Meter& meter, std::string_view stream) {
   auto& parts = parts_place.make(*config, supervisor);
   Counts tick;
   std::array<Counts, 5> part;
-  const bool read = over_stream(stream, [&](const hal::Sample& s, bool counted, std::uint32_t) {
-    const bool due = whole.add(s);
-    keep(parts.add(s));
+  const auto step = [&](const hal::Sample& sample, bool counted) {
+    const bool due = whole.add(sample);
+    keep(parts.add(sample));
     if (!due) return;
     const std::array<std::uint32_t, 5> used{
         meter.count([&] { parts.close_window(); }), meter.count([&] { parts.find_force(); }),
@@ -153,7 +153,12 @@ bool count_control_tick(Meter& meter, std::string_view stream) {
     if (!counted) return;
     tick.add(all);
     for (std::size_t k = 0; k < part.size(); ++k) part[k].add(used[k]);
-  });
+  };
+  const bool read = over_stream(
+      stream, [&](const hal::Sample& sample) { step(sample, false); },
+      [&](std::span<const hal::Sample> block, bool counted) {
+        for (const hal::Sample& sample : block) step(sample, counted);
+      });
   tick.show("control_tick_synthesized");
   constexpr std::array<std::string_view, 5> kNames{"torque_path_window", "cutting_force",
                                                    "control_path_pi", "supervisor_step",
