@@ -8,53 +8,12 @@
 namespace cutforce::control {
 namespace {
 
-constexpr float kTrendMemory_s = 0.25F;
-constexpr float kNoiseMemory_s = 20.0F;
-constexpr float kUsualPower = 0.9F;  // of a normal variable cut off at kUsual, less a margin
-constexpr float kTwiceThreshold_ratio = 0.81F;
 constexpr float kModelSpread_ratio =
     0.06F;  // of a gain that was learned from a jump: the lags are not exact
 constexpr float kBeginSpread_ratio = 0.2F;
 constexpr float kLeastFeed = 0.01F;
-constexpr float kMostGain_ratio = 1000.0F;  // of the config's: no cut
 
 }  // namespace
-
-auto GainTracker::make(const Config& config) noexcept -> std::expected<GainTracker, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return GainTracker{config};
-}
-
-GainTracker::GainTracker(const Config& config) noexcept
-    : lag_(LagStep::of(config.period_s, 0.0F, config.cut_lag_s, config.sensor_lag_s)),
-      left_(1.0F - lag_.cut),
-      noise_ratio_(config.noise_ratio),
-      noise_n2_(square(config.noise_n)),
-      jump_threshold_(config.jump_threshold),
-      twice_threshold_(kTwiceThreshold_ratio * config.jump_threshold),
-      most_gain_n_(kMostGain_ratio * config.gain_n),
-      sqrt_period_(std::sqrt(config.period_s)),
-      memory_share_(config.period_s / (kTrendMemory_s + config.period_s)),
-      noise_kept_(kNoiseMemory_s / (kNoiseMemory_s + config.period_s)),
-      noise_share_(config.period_s / (kNoiseMemory_s + config.period_s) / kUsualPower),
-      jump_({.period_s = config.period_s,
-             .cut_lag_s = config.cut_lag_s,
-             .sensor_lag_s = config.sensor_lag_s,
-             .most_gain_n = most_gain_n_}) {
-  own_.memory_n = config.gain_n;
-  settle_in_air();
-}
-
-// Out of the cut: the last gain is remembered.
-void GainTracker::settle_in_air() noexcept {
-  Own& s = own_;
-  s.air = 1;
-  s.now.gain_n = 0.0F;
-  s.now.covariance = {};
-  s.now.covariance[ForceBelief::kSS] = noise_n2_;
-  s.correlation = 0.0F;
-  s.power = 1.0F;
-}
 
 // The first reading of all: as if the force had been this for long.
 void GainTracker::begin(float reading_n, float feed, float entry_n) noexcept {

@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <expected>
 #include <type_traits>
@@ -89,9 +90,10 @@ class GainTracker {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static std::expected<GainTracker, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<GainTracker, ConfigError> make(
+      const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays.
-  [[nodiscard]] static GainTracker make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr GainTracker make_checked(const Config& config) noexcept {
     return GainTracker{config};
   }
 
@@ -100,7 +102,7 @@ class GainTracker {
   void coast(float feed) noexcept;
 
   // Another part: only the last gain is remembered.
-  void restart() noexcept;
+  [[gnu::cold]] void restart() noexcept;
 
   [[nodiscard]] bool follows_jump() const noexcept { return jump_.active(); }
   [[nodiscard]] float gain_n() const noexcept { return own_.now.gain_n; }
@@ -111,6 +113,13 @@ class GainTracker {
   }
 
  private:
+  static constexpr float kTrendMemory_s = 0.25F;
+  static constexpr float kNoiseMemory_s = 20.0F;
+  static constexpr float kUsualPower =
+      0.9F;  // of a normal variable cut off at kUsual, less a margin
+  static constexpr float kTwiceThreshold_ratio = 0.81F;
+  static constexpr float kMostGain_ratio = 1000.0F;  // of the config's: no cut
+
   static constexpr float kDrift_ratio_sqrt_s = 0.018F;  // of the gain, in a steady cut
   static constexpr float kTrend_ratio_sqrt_s = 0.168F;  // more of it for each unit of trend
   static constexpr float kTrendFloor = 0.1F;
@@ -128,7 +137,7 @@ class GainTracker {
                : std::clamp(x, 0.0F, most);
   }
 
-  explicit GainTracker(const Config& config) noexcept;
+  explicit constexpr GainTracker(const Config& config) noexcept;
 
   void predict(ForceBelief& x, float feed, float feed_sigma, float drift) const noexcept;
   static void correct(ForceBelief& x, float innovation_n, float variance_n2) noexcept;
@@ -139,10 +148,10 @@ class GainTracker {
                                float innovation_n) const noexcept;
   void note_calm(float innovation, bool drifts) noexcept;
   void remember(const JumpResolver::Reading& reading) noexcept;
-  void begin_jump(const JumpResolver::Reading& reading) noexcept;
+  [[gnu::cold]] void begin_jump(const JumpResolver::Reading& reading) noexcept;
   [[nodiscard]] JumpResolver::Outcome follow_on(const JumpResolver::Reading& reading) noexcept;
-  void begin(float reading_n, float feed, float entry_n) noexcept;
-  void settle_in_air() noexcept;
+  [[gnu::cold]] void begin(float reading_n, float feed, float entry_n) noexcept;
+  [[gnu::cold]] constexpr void settle_in_air() noexcept;
 
   LagStep lag_;
   float left_;  // of the cut, (1 - e_p)
@@ -158,6 +167,43 @@ class GainTracker {
   Own own_{};
   JumpResolver jump_;
 };
+
+constexpr auto GainTracker::make(const Config& config) noexcept
+    -> std::expected<GainTracker, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return GainTracker{config};
+}
+
+constexpr GainTracker::GainTracker(const Config& config) noexcept
+    : lag_(LagStep::of(config.period_s, 0.0F, config.cut_lag_s, config.sensor_lag_s)),
+      left_(1.0F - lag_.cut),
+      noise_ratio_(config.noise_ratio),
+      noise_n2_(square(config.noise_n)),
+      jump_threshold_(config.jump_threshold),
+      twice_threshold_(kTwiceThreshold_ratio * config.jump_threshold),
+      most_gain_n_(kMostGain_ratio * config.gain_n),
+      sqrt_period_(std::sqrt(config.period_s)),
+      memory_share_(config.period_s / (kTrendMemory_s + config.period_s)),
+      noise_kept_(kNoiseMemory_s / (kNoiseMemory_s + config.period_s)),
+      noise_share_(config.period_s / (kNoiseMemory_s + config.period_s) / kUsualPower),
+      jump_({.period_s = config.period_s,
+             .cut_lag_s = config.cut_lag_s,
+             .sensor_lag_s = config.sensor_lag_s,
+             .most_gain_n = most_gain_n_}) {
+  own_.memory_n = config.gain_n;
+  settle_in_air();
+}
+
+// Out of the cut: the last gain is remembered.
+constexpr void GainTracker::settle_in_air() noexcept {
+  Own& s = own_;
+  s.air = 1;
+  s.now.gain_n = 0.0F;
+  s.now.covariance = {};
+  s.now.covariance[ForceBelief::kSS] = noise_n2_;
+  s.correlation = 0.0F;
+  s.power = 1.0F;
+}
 
 static_assert(std::is_trivially_copyable_v<GainTracker>);
 static_assert(std::is_standard_layout_v<GainTracker::State>);

@@ -15,7 +15,6 @@ constexpr float kEachMoment = (1.0F - kNothing) / static_cast<float>(JumpResolve
 constexpr std::uint32_t kMostRestarts = 4;
 constexpr float kBadFit = 9.0F;
 constexpr float kBadFitEach = 4.0F;
-constexpr std::array<float, JumpResolver::kMomentsOfTick> kOnset{0.05F, 0.35F, 0.7F};  // of a tick
 
 constexpr float square(float x) noexcept { return x * x; }
 
@@ -35,17 +34,6 @@ float share_of(float difference) noexcept {
 }
 
 }  // namespace
-
-JumpResolver::JumpResolver(const Config& config) noexcept
-    : lag_(LagStep::of(config.period_s, 0.0F, config.cut_lag_s, config.sensor_lag_s)),
-      left_(1.0F - lag_.cut),
-      most_gain_n_(config.most_gain_n) {
-  for (std::size_t k = 0; k < kMomentsOfTick; ++k) {
-    const auto rest = LagStep::of((1.0F - kOnset[k]) * config.period_s, 0.0F, config.cut_lag_s,
-                                  config.sensor_lag_s);
-    onsets_[k] = {.force = 1.0F - rest.cut, .sensed = rest.sensed_input};
-  }
-}
 
 // The open loop goes one tick on. (C80)
 inline auto JumpResolver::advance_base(const Reading& reading, float gain_n) noexcept -> Residual {

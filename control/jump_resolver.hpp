@@ -87,7 +87,7 @@ class JumpResolver {
     kGivesUp,      // nor did those that it began again from
   };
 
-  explicit JumpResolver(const Config& config) noexcept;
+  explicit constexpr JumpResolver(const Config& config) noexcept;
 
   [[nodiscard]] bool active() const noexcept { return state_.samples > 0; }
   [[nodiscard]] bool rising() const noexcept { return state_.rising != 0; }
@@ -108,6 +108,8 @@ class JumpResolver {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
+  static constexpr std::array<float, kMomentsOfTick> kOnset{0.05F, 0.35F, 0.7F};  // of a tick
+
   struct Fit {
     float jump_n;  // of the gain
     float misfit;  // sum of r^2 / R, with the prior's share
@@ -137,6 +139,17 @@ class JumpResolver {
   float most_gain_n_;
   State state_{};
 };
+
+constexpr JumpResolver::JumpResolver(const Config& config) noexcept
+    : lag_(LagStep::of(config.period_s, 0.0F, config.cut_lag_s, config.sensor_lag_s)),
+      left_(1.0F - lag_.cut),
+      most_gain_n_(config.most_gain_n) {
+  for (std::size_t k = 0; k < kMomentsOfTick; ++k) {
+    const auto rest = LagStep::of((1.0F - kOnset[k]) * config.period_s, 0.0F, config.cut_lag_s,
+                                  config.sensor_lag_s);
+    onsets_[k] = {.force = 1.0F - rest.cut, .sensed = rest.sensed_input};
+  }
+}
 
 static_assert(std::is_trivially_copyable_v<JumpResolver>);
 static_assert(std::is_standard_layout_v<JumpResolver::State>);

@@ -6,7 +6,6 @@ namespace cutforce::control {
 namespace {
 
 constexpr float kMoves_ratio = 0.04F;  // a chain that changes by less within a tick tells nothing
-constexpr float kMemory_s = 0.6F;      // of moving time
 constexpr float kEnough_s = 0.4F;      // of moving time, before anything is decided
 constexpr float kBetter_ratio = 0.45F;
 constexpr float kStep_s = 0.06F;  // the present dead time follows by this much at a time
@@ -17,19 +16,6 @@ constexpr float relative_change(float now, float before) noexcept {
 }
 
 }  // namespace
-
-auto LatencyBank::make(const Config& config) noexcept -> std::expected<LatencyBank, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return LatencyBank{config};
-}
-
-LatencyBank::LatencyBank(const Config& config) noexcept
-    : config_(config),
-      tick_(LagStep::of(config.period_s, config.feed_lag_s, config.cut_lag_s, config.sensor_lag_s)),
-      grid_ticks_(config.most_latency_s / static_cast<float>(kCandidates - 2) / config.period_s),
-      share_(config.period_s / (kMemory_s + config.period_s)) {
-  state_.latency_s = config.latency_s;
-}
 
 float LatencyBank::candidate_s(std::size_t k) const noexcept {
   if (k == 0) return state_.latency_s;

@@ -93,6 +93,9 @@ class PiController {
             .stability_margin_ratio = seen.margin_ratio(highest_process_gain_n_pct_)};
   }
 
+  // In charge after another law: as make() left it.
+  constexpr void rejoin() noexcept { state_ = State{}; }
+
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
   constexpr void restore(const State& state) noexcept { state_ = state; }
 

@@ -64,7 +64,7 @@ class Predictive {
     bool learns;             // from one part to the next; needs the start of each
     bool finds_latency;      // while cutting: a commissioning step
 
-    [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
   };
 
   using Input = LawInput;
@@ -100,14 +100,14 @@ class Predictive {
   // Fails iff check() does.
   [[nodiscard]] static std::expected<Predictive, ConfigError> make(const Config& config) noexcept;
   // Of a config that make() accepts, made where it stays: 5 kB do not pass over a stack.
-  [[nodiscard]] static Predictive make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr Predictive make_checked(const Config& config) noexcept {
     return Predictive{config};
   }
 
   [[nodiscard]] Output step(const Input& input) noexcept;
   // In charge again after another law: what was learned of parts and of the dead time stays, but
   // nothing of this part, whose path nobody followed.
-  void rejoin() noexcept;
+  [[gnu::cold]] void rejoin() noexcept;
 
   // Whether a jump of the process gain is being followed: the dearest ticks.
   [[nodiscard]] bool follows_jump() const noexcept { return tracker_.follows_jump(); }
@@ -116,7 +116,7 @@ class Predictive {
   void restore(const State& state) noexcept;
 
  private:
-  explicit Predictive(const Config& config) noexcept;
+  explicit constexpr Predictive(const Config& config) noexcept;
 
   struct Forecast {  // of the end of the dead time
     float force_n;
@@ -136,8 +136,8 @@ class Predictive {
     float mean;  // over the tick that ends
     float sigma;
   };
-  void assume_latency(float latency_s) noexcept;
-  void begin_part() noexcept;
+  [[gnu::cold]] constexpr void assume_latency(float latency_s) noexcept;
+  [[gnu::cold]] void begin_part() noexcept;
   [[nodiscard]] Output hold(const KnownFeed& feed, float speed, float applied_pct) noexcept;
   [[nodiscard]] KnownFeed known_feed(float applied_pct) noexcept;
   void note_jump(bool rising, float gain_before_n) noexcept;
@@ -184,3 +184,5 @@ class Predictive {
 };
 
 }  // namespace cutforce::control
+
+#include "control/predictive_make.hpp"  // IWYU pragma: export

@@ -192,16 +192,17 @@ class Supervisor {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static std::expected<Supervisor, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<Supervisor, ConfigError> make(
+      const Config& config) noexcept;
   [[nodiscard]] Output step(const Input& input) noexcept;
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit Supervisor(const Config& config) noexcept;
+  explicit constexpr Supervisor(const Config& config) noexcept;
 
-  [[nodiscard]] std::uint32_t steps(float time_s) const noexcept;
+  [[nodiscard]] constexpr std::uint32_t steps(float time_s) const noexcept;
   void note_ages(const Input& input) noexcept;
   void note_force(const Input& input) noexcept;
   void note_missed(std::uint32_t missed_ticks) noexcept;
@@ -225,6 +226,44 @@ class Supervisor {
   float missed_most_;
   State state_{};
 };
+
+constexpr auto Supervisor::make(const Config& config) noexcept
+    -> std::expected<Supervisor, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return Supervisor{config};
+}
+
+constexpr Supervisor::Supervisor(const Config& config) noexcept
+    : config_(config),
+      link_steps_(steps(config.link_timeout_s)),
+      samples_steps_(steps(config.samples_timeout_s)),
+      estimate_steps_(steps(config.estimate_timeout_s)),
+      release_steps_(steps(config.hold_release_s)),
+      window_part_steps_(std::max<std::uint32_t>(steps(config.overrun_window_s) / 8, 1U)),
+      missed_most_(config.overrun_ratio * static_cast<float>(steps(config.overrun_window_s))) {
+  state_ = {.state = SupervisorState::kBoot,
+            .reason = Reason::kNone,
+            .override_pct = static_cast<std::uint8_t>(config.neutral_pct + 0.5F),
+            .lows = 0,
+            .controlled = 0,
+            .forces_over = 0,
+            .force_n = 0.0F,
+            .position_pct = config.neutral_pct,
+            .fall_to_pct = config.neutral_pct,
+            .link_age = kNever,
+            .sample_age = kNever,
+            .force_age = kNever,
+            .estimate_age = 0,
+            .calm_steps = 0,
+            .missed_run = 0,
+            .window_steps = 0,
+            .window_part = 0,
+            .missed = {}};
+}
+
+constexpr std::uint32_t Supervisor::steps(float time_s) const noexcept {
+  return std::max<std::uint32_t>(static_cast<std::uint32_t>(time_s / config_.period_s + 0.5F), 1U);
+}
 
 static_assert(std::is_trivially_copyable_v<Supervisor>);
 static_assert(sizeof(Supervisor::State) == 4 + 13 * 4 + 8 * 4);

@@ -8,40 +8,12 @@ namespace {
 // Beyond this angle of rotation between two samples the sinusoid is not resolved; the integral
 // starts anew from the steady state.
 constexpr float kLargestHalfAngle_rad = 1.0F;
-constexpr float kSmallestFrequency_rad_s = 6.0F;  // below it the phase of the leak is not corrected
-constexpr float kSlowestLeak_rad_s = 10.0F;       // the leak never acts slower than at this w_e
 
 constexpr SpaceVector times(SpaceVector a, SpaceVector b) noexcept {
   return {a.alpha * b.alpha - a.beta * b.beta, a.alpha * b.beta + a.beta * b.alpha};
 }
 
 }  // namespace
-
-auto FluxTorque::make(const Config& config) noexcept -> std::expected<FluxTorque, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  FluxTorque block{config};
-  block.set_frequency(0.0F);
-  return block;
-}
-
-auto FluxTorque::coefficients(float frequency_rad_s, float period_s) const noexcept
-    -> Coefficients {
-  const float size = magnitude(frequency_rad_s);
-  const float acting = size > kSlowestLeak_rad_s ? size : kSlowestLeak_rad_s;
-  const float leaked = config_.leak_ratio * acting * period_s;
-  const float a = leaked < 0.5F ? 1.0F - leaked : 0.5F;
-  const float half_angle = 0.5F * frequency_rad_s * period_s;
-  const float t_over_w = 0.5F * period_s * tan_over_x(half_angle);  // t / w_e
-  const float leak_over_w = size > kSmallestFrequency_rad_s ? (1.0F - a) / frequency_rad_s : 0.0F;
-  return {.leak = a, .gain_s = {0.5F * t_over_w * (1.0F + a), -0.5F * leak_over_w}};  // (E64)
-}
-
-void FluxTorque::set_frequency(float frequency_rad_s) noexcept {
-  const auto [leak, gain] = coefficients(frequency_rad_s, config_.sample_period_s);
-  state_.leak = leak;
-  state_.gain_s = gain;
-  state_.frequency_rad_s = frequency_rad_s;
-}
 
 void FluxTorque::step_run(std::span<const MotorSample> samples) noexcept {
   if (samples.empty()) return;

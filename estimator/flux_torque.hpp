@@ -22,6 +22,7 @@
 #include <span>
 #include <type_traits>
 
+#include "estimator/polynomials.hpp"
 #include "estimator/space_vector.hpp"
 
 namespace cutforce::estimator {
@@ -72,19 +73,20 @@ class FluxTorque {
     std::uint32_t samples = 0;  // since the start, saturating: the first has no predecessor
   };
 
-  [[nodiscard]] static std::expected<FluxTorque, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<FluxTorque, ConfigError> make(
+      const Config& config) noexcept;
 
   // Samples that follow the last one, and each other, by one period.
   void step_run(std::span<const MotorSample> samples) noexcept;
   // elapsed_periods: time since the last sample in nominal sample periods. With 1 the same as a run
   // of one.
-  void step(const MotorSample& sample, float elapsed_periods) noexcept;
+  [[gnu::cold]] void step(const MotorSample& sample, float elapsed_periods) noexcept;
 
   // Closes the window. Duration 0 (no sample since the last call) gives the last torque.
   [[nodiscard]] Window take() noexcept;
 
   // Electrical frequency for the samples to come, (E63), (E64).
-  void set_frequency(float frequency_rad_s) noexcept;
+  constexpr void set_frequency(float frequency_rad_s) noexcept;
 
   // Sets the flux to the steady state of the last sample at w_e.
   void seed() noexcept;
@@ -97,13 +99,18 @@ class FluxTorque {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit FluxTorque(const Config& config) noexcept
+  static constexpr float kSlowestLeak_rad_s = 10.0F;  // the leak never acts slower than at this w_e
+  static constexpr float kSmallestFrequency_rad_s =
+      6.0F;  // below it the phase of the leak is not corrected
+
+  explicit constexpr FluxTorque(const Config& config) noexcept
       : config_(config), torque_scale_(1.5F * config.pole_pairs) {}
   struct Coefficients {
     float leak;
     SpaceVector gain_s;
   };
-  [[nodiscard]] Coefficients coefficients(float frequency_rad_s, float period_s) const noexcept;
+  [[nodiscard]] constexpr Coefficients coefficients(float frequency_rad_s,
+                                                    float period_s) const noexcept;
 
   [[nodiscard]] static SpaceVector emf(const MotorSample& sample, float ohm) noexcept {  // (E60)
     return {sample.voltage_v.alpha - ohm * sample.current_a.alpha,
@@ -166,6 +173,33 @@ class FluxTorque {
   float torque_scale_;
   State state_{};
 };
+
+constexpr auto FluxTorque::make(const Config& config) noexcept
+    -> std::expected<FluxTorque, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  FluxTorque block{config};
+  block.set_frequency(0.0F);
+  return block;
+}
+
+constexpr auto FluxTorque::coefficients(float frequency_rad_s, float period_s) const noexcept
+    -> Coefficients {
+  const float size = magnitude(frequency_rad_s);
+  const float acting = size > kSlowestLeak_rad_s ? size : kSlowestLeak_rad_s;
+  const float leaked = config_.leak_ratio * acting * period_s;
+  const float a = leaked < 0.5F ? 1.0F - leaked : 0.5F;
+  const float half_angle = 0.5F * frequency_rad_s * period_s;
+  const float t_over_w = 0.5F * period_s * tan_over_x(half_angle);  // t / w_e
+  const float leak_over_w = size > kSmallestFrequency_rad_s ? (1.0F - a) / frequency_rad_s : 0.0F;
+  return {.leak = a, .gain_s = {0.5F * t_over_w * (1.0F + a), -0.5F * leak_over_w}};  // (E64)
+}
+
+constexpr void FluxTorque::set_frequency(float frequency_rad_s) noexcept {
+  const auto [leak, gain] = coefficients(frequency_rad_s, config_.sample_period_s);
+  state_.leak = leak;
+  state_.gain_s = gain;
+  state_.frequency_rad_s = frequency_rad_s;
+}
 
 static_assert(std::is_trivially_copyable_v<FluxTorque>);
 

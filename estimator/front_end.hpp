@@ -85,7 +85,8 @@ class FrontEnd {
     SpaceVector rotation;  // exp(-j w_e t_lead)
   };
 
-  [[nodiscard]] static std::expected<FrontEnd, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<FrontEnd, ConfigError> make(
+      const Config& config) noexcept;
 
   [[nodiscard]] Output step(const Input& input) const noexcept {
     Output output{.motor = map_.vectors(input.voltage_v, input.current_a),
@@ -143,17 +144,17 @@ class FrontEnd {
   }
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
-  void restore(const State& state) noexcept;
+  constexpr void restore(const State& state) noexcept;
 
  private:
   [[nodiscard]] static constexpr std::expected<void, ConfigError> check_calibration(
       const Calibration& calibration) noexcept;
 
-  FrontEnd(VoltageChannels voltages, CurrentChannels currents) noexcept
+  constexpr FrontEnd(VoltageChannels voltages, CurrentChannels currents) noexcept
       : voltages_(voltages), currents_(currents) {}
 
-  void fold() noexcept;
-  void find_lead() noexcept {
+  constexpr void fold() noexcept;
+  constexpr void find_lead() noexcept {
     const SpaceVector r = state_.rotation;
     leads_ = r.alpha < 1.0F || r.beta < 0.0F || r.beta > 0.0F ? 1U : 0U;
   }
@@ -184,6 +185,79 @@ constexpr std::expected<void, FrontEnd::ConfigError> FrontEnd::check_calibration
   for (const float o : calibration.current_offset_a)
     if (!offset(o)) return std::unexpected{ConfigError::kCurrentOffset};
   return {};
+}
+
+namespace detail {
+
+inline constexpr float kInverseSqrt3 = 0.577350269F;
+
+using Row = std::array<float, 3>;
+
+// Weights of the three channels before gain and offset. A weight of 0 keeps what is not
+// measured out of the vector.
+struct Clarke {
+  Row alpha;
+  Row beta;
+};
+
+inline constexpr Clarke kStar{{2.0F / 3.0F, -1.0F / 3.0F, -1.0F / 3.0F},  // (E2)
+                              {0.0F, kInverseSqrt3, -kInverseSqrt3}};
+inline constexpr Clarke kLine{{1.0F / 3.0F, 0.0F, -1.0F / 3.0F},  // (E3)
+                              {0.0F, kInverseSqrt3, 0.0F}};
+inline constexpr Clarke kTwoLines{{2.0F / 3.0F, 1.0F / 3.0F, 0.0F},  // (E3)
+                                  {0.0F, kInverseSqrt3, 0.0F}};
+inline constexpr Clarke kTwoCurrents{{1.0F, 0.0F, 0.0F},  // (E4)
+                                     {kInverseSqrt3, 2.0F * kInverseSqrt3, 0.0F}};
+
+constexpr std::array<float, 4> folded(const Row& row, const Row& gain, const Row& offset) noexcept {
+  std::array<float, 4> out{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    out[k] = row[k] * gain[k];
+    out[3] += out[k] * offset[k];
+  }
+  return out;
+}
+
+constexpr const Clarke& of(VoltageChannels channels) noexcept {
+  switch (channels) {
+    case VoltageChannels::kLineToLine:
+      return kLine;
+    case VoltageChannels::kTwoLineToLine:
+      return kTwoLines;
+    case VoltageChannels::kLineToNeutral:
+      break;
+  }
+  return kStar;
+}
+
+}  // namespace detail
+
+constexpr auto FrontEnd::make(const Config& config) noexcept
+    -> std::expected<FrontEnd, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  FrontEnd block{config.voltages, config.currents};
+  block.restore({.calibration = config.calibration, .rotation = {1.0F, 0.0F}});
+  return block;
+}
+
+constexpr void FrontEnd::restore(const State& state) noexcept {
+  state_ = state;
+  fold();
+  find_lead();
+}
+
+constexpr void FrontEnd::fold() noexcept {  // (E5)
+  const Calibration& c = state_.calibration;
+  const detail::Clarke& voltage = detail::of(voltages_);
+  const bool two = currents_ == CurrentChannels::kTwo;
+  const detail::Clarke& current = two ? detail::kTwoCurrents : detail::kStar;
+  const detail::Row ones = two ? detail::Row{} : detail::Row{1.0F, 1.0F, 1.0F};
+  const auto vb = detail::folded(voltage.beta, c.voltage_gain_ratio, c.voltage_offset_v);
+  map_.va = detail::folded(voltage.alpha, c.voltage_gain_ratio, c.voltage_offset_v);
+  map_.vb = {vb[1], vb[2], vb[3]};
+  map_.ia = detail::folded(current.alpha, c.current_gain_ratio, c.current_offset_a);
+  map_.ib = detail::folded(current.beta, c.current_gain_ratio, c.current_offset_a);
+  residual_ = detail::folded(ones, c.current_gain_ratio, c.current_offset_a);
 }
 
 static_assert(std::is_trivially_copyable_v<FrontEnd>);

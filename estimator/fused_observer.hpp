@@ -140,10 +140,10 @@ class FusedObserver {
     Tick tick;
   };
 
-  [[nodiscard]] static std::expected<FusedObserver, ConfigError> make(
+  [[nodiscard]] static constexpr std::expected<FusedObserver, ConfigError> make(
       const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays.
-  [[nodiscard]] static FusedObserver make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr FusedObserver make_checked(const Config& config) noexcept {
     return FusedObserver{config};
   }
 
@@ -182,7 +182,7 @@ class FusedObserver {
   void restore(const State& state) noexcept;
 
  private:
-  explicit FusedObserver(const Config& config) noexcept;
+  explicit constexpr FusedObserver(const Config& config) noexcept;
 
   struct Rotation {
     float flux_rad_s;
@@ -220,6 +220,26 @@ class FusedObserver {
   float share_of_s_ = 0.0F;  // length of the tick that share_, of (E101), belongs to
   float share_ = 0.0F;
 };
+
+constexpr auto FusedObserver::make(const Config& config) noexcept
+    -> std::expected<FusedObserver, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return FusedObserver{config};
+}
+
+constexpr FusedObserver::FusedObserver(const Config& config) noexcept
+    : flux_(*FluxTorque::make(config.flux)),
+      config_(config),
+      filter_(*LoadTorqueFilter::make(config.filter)),
+      air_(*AirCut::make(config.air)),
+      noise_({.sample_period_s = config.flux.sample_period_s,
+              .rated_torque_nm = config.filter.rated_torque_nm,
+              .sensorless = config.sensorless}),
+      inertia_(*RunUpInertia::make(config.inertia)),
+      resistance_(*StatorResistance::make(config.resistance)),
+      meter_(*PowerScale::make(config.meter)) {
+  tick_.calibrated = config.calibrate ? 0U : 1U;
+}
 
 static_assert(std::is_trivially_copyable_v<FusedObserver>);
 

@@ -102,7 +102,8 @@ class SampleGate {
     std::uint32_t unusual = 1;   // 0: started, and none of the counts above is running
   };
 
-  [[nodiscard]] static std::expected<SampleGate, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<SampleGate, ConfigError> make(
+      const Config& config) noexcept;
 
   // Whatever comes; what the usual sample takes is in accept_run().
   [[nodiscard]] Output step(const Input& input) noexcept;
@@ -126,6 +127,9 @@ class SampleGate {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
+  // The positive end of 10 bits and more lies above this share of the range.
+  static constexpr float kEnd = 0.998F;
+
   struct Limits {
     std::int64_t period_ns;
     std::int64_t tolerance_ns;  // 1 % of the period
@@ -148,14 +152,14 @@ class SampleGate {
     std::uint32_t power_bits;
   };
 
-  explicit SampleGate(const Limits& limits) noexcept : limits_(limits) {}
+  explicit constexpr SampleGate(const Limits& limits) noexcept : limits_(limits) {}
 
   [[nodiscard]] static float square(const std::array<float, 3>& x) noexcept {
     return x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
   }
   // Not negative floats order like their bits, and NaN lies above infinity: a comparison of
   // integers takes two instructions less than one of floats on a Cortex-M.
-  [[nodiscard]] static std::uint32_t magnitude_bits(float x) noexcept {
+  [[nodiscard]] static constexpr std::uint32_t magnitude_bits(float x) noexcept {
     return std::bit_cast<std::uint32_t>(x) & 0x7FFF'FFFFU;
   }
   [[nodiscard]] bool not_later(std::int64_t time_ns) noexcept;
@@ -180,6 +184,34 @@ constexpr std::expected<void, SampleGate::ConfigError> SampleGate::Config::check
   if (bridge_limit > kMostCount) return std::unexpected{ConfigError::kBridgeLimit};
   if (clock_limit > kMostCount) return std::unexpected{ConfigError::kClockLimit};
   return {};
+}
+
+constexpr auto SampleGate::make(const Config& config) noexcept
+    -> std::expected<SampleGate, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  const auto in_ns = [](float s) { return static_cast<std::uint32_t>(s * 1e9F + 0.5F); };
+  const std::uint32_t period_ns = in_ns(config.sample_period_s);
+  const std::uint32_t tolerance_ns = period_ns / 100;
+  const float voltage_end_v = kEnd * config.voltage_limit_v;
+  const float current_end_a = kEnd * config.current_limit_a;
+  return SampleGate{{.period_ns = period_ns,
+                     .tolerance_ns = tolerance_ns,
+                     .gap_ns = in_ns(config.gap_limit_s),
+                     .periods_per_ns = 1.0F / static_cast<float>(period_ns),
+                     .voltage_v = config.voltage_limit_v,
+                     .current_a = config.current_limit_a,
+                     .voltage_end_v = voltage_end_v,
+                     .current_end_a = current_end_a,
+                     .speed_rad_s = config.speed_limit_rad_s,
+                     .power_w = config.power_limit_w,
+                     .bridge = config.bridge_limit,
+                     .clock = config.clock_limit,
+                     .early_ns = period_ns - tolerance_ns,
+                     .window_ns = 2 * tolerance_ns,
+                     .voltage_end_square_v2 = voltage_end_v * voltage_end_v,
+                     .current_end_square_a2 = current_end_a * current_end_a,
+                     .speed_bits = magnitude_bits(config.speed_limit_rad_s),
+                     .power_bits = magnitude_bits(config.power_limit_w)}};
 }
 
 template <unsigned present_shift, class Row, class Accepted>

@@ -141,9 +141,10 @@ class SignalHealth {
     float speed_frequency_rad_s = 0.0F;  // when it last changed
   };
 
-  [[nodiscard]] static std::expected<SignalHealth, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<SignalHealth, ConfigError> make(
+      const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays.
-  [[nodiscard]] static SignalHealth make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr SignalHealth make_checked(const Config& config) noexcept {
     return SignalHealth{config};
   }
 
@@ -195,7 +196,7 @@ class SignalHealth {
     const PeriodPhasors::Input& sample;
   };
 
-  explicit SignalHealth(const Config& config) noexcept : config_(config) {}
+  explicit constexpr SignalHealth(const Config& config) noexcept : config_(config) {}
 
   void raise(Fault fault) noexcept;
   void next_place() noexcept;
@@ -239,6 +240,12 @@ constexpr std::expected<void, SignalHealth::ConfigError> SignalHealth::Config::c
     return fail(ConfigError::kRating);
   if (!(hold_s >= 0.0F && hold_s <= 60.0F)) return fail(ConfigError::kHold);
   return {};
+}
+
+constexpr auto SignalHealth::make(const Config& config) noexcept
+    -> std::expected<SignalHealth, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return SignalHealth{config};
 }
 
 static_assert(std::is_trivially_copyable_v<SignalHealth>);

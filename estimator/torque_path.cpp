@@ -6,21 +6,6 @@
 
 namespace cutforce::estimator {
 
-auto TorquePath::make(const Config& config) noexcept -> std::expected<TorquePath, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return TorquePath{config};
-}
-
-TorquePath::TorquePath(const Config& config) noexcept
-    : config_(config),
-      blocks_{.power = *AirGapPower::make(config.power),
-              .synchronous = *SynchronousSpeed::make(config.synchronous),
-              .meter = *MeasuredPower::make(config.meter),
-              .drive = *DriveModel::make(config.drive),
-              .friction = *LoadFriction::make(config.load_friction),
-              .tare = *IdleTare::make(config.tare),
-              .monitor = *SynthesizedMonitor::make(config.monitor)} {}
-
 bool TorquePath::add_motor(std::span<const MotorSample> motor) noexcept {
   const bool power_ends = blocks_.power.add_run(motor, sums_.electrical_rad_s);
   return blocks_.synchronous.add_run(motor) && power_ends;

@@ -130,9 +130,10 @@ class TorquePath {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static std::expected<TorquePath, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<TorquePath, ConfigError> make(
+      const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays.
-  [[nodiscard]] static TorquePath make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr TorquePath make_checked(const Config& config) noexcept {
     return TorquePath{config};
   }
 
@@ -171,7 +172,7 @@ class TorquePath {
   struct Estimate;  // one torque with its share of the uncertainty
   struct Load;      // what inertia and friction take
 
-  explicit TorquePath(const Config& config) noexcept;
+  explicit constexpr TorquePath(const Config& config) noexcept;
 
   [[nodiscard]] Window window(const AirGapPower::Output& power,
                               const SynchronousSpeed::Output& synchronous) noexcept;
@@ -216,6 +217,22 @@ bool TorquePath::add_run(std::span<const MotorSample> motor, std::span<const Row
   if (speed_valid) sums_.speed_samples += count;
   return add_motor(motor);
 }
+
+constexpr auto TorquePath::make(const Config& config) noexcept
+    -> std::expected<TorquePath, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return TorquePath{config};
+}
+
+constexpr TorquePath::TorquePath(const Config& config) noexcept
+    : config_(config),
+      blocks_{.power = *AirGapPower::make(config.power),
+              .synchronous = *SynchronousSpeed::make(config.synchronous),
+              .meter = *MeasuredPower::make(config.meter),
+              .drive = *DriveModel::make(config.drive),
+              .friction = *LoadFriction::make(config.load_friction),
+              .tare = *IdleTare::make(config.tare),
+              .monitor = *SynthesizedMonitor::make(config.monitor)} {}
 
 static_assert(std::is_trivially_copyable_v<TorquePath>);
 static_assert(std::is_trivially_copyable_v<TorquePath::State>);

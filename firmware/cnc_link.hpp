@@ -26,7 +26,7 @@ class CncLink {
     bool foreign = false;       // a frame with our identifiers since the last fetch_foreign()
   };
 
-  explicit CncLink(std::uint8_t node) noexcept : node_(node) {}
+  explicit constexpr CncLink(std::uint8_t node) noexcept : node_(node) {}
 
   void take(const hal::can::Frame& frame) noexcept;
 

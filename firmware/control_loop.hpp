@@ -71,7 +71,7 @@ class ControlLoop {
     estimator::CuttingForce::Config force;
     control::ControlPath::Config controller;
 
-    [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
   };
 
   // What the loop itself keeps between samples.
@@ -128,7 +128,7 @@ class ControlLoop {
   // Fails iff check() does.
   [[nodiscard]] static std::expected<ControlLoop, ConfigError> make(const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays: 9 kB do not pass over a small stack.
-  [[nodiscard]] static ControlLoop make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr ControlLoop make_checked(const Config& config) noexcept {
     return ControlLoop{config};
   }
 
@@ -143,7 +143,7 @@ class ControlLoop {
   }
 
   // Of the last control tick; before the first, the neutral override.
-  [[nodiscard]] const hal::Command& command() const noexcept { return command_; }
+  [[nodiscard]] constexpr const hal::Command& command() const noexcept { return command_; }
 
   // Puts another law in charge from the next control tick on (control/law_set.hpp).
   void select(control::LawName name) noexcept { controller_.select(name); }
@@ -156,7 +156,7 @@ class ControlLoop {
   void restore(const State& state) noexcept;
 
  private:
-  explicit ControlLoop(const Config& config) noexcept;
+  explicit constexpr ControlLoop(const Config& config) noexcept;
 
   static constexpr std::uint32_t kCommands =
       hal::bit(hal::Signal::kMeasuredForce) | hal::bit(hal::Signal::kFeedActive) |
@@ -167,7 +167,7 @@ class ControlLoop {
   [[nodiscard]] std::size_t step_run(std::span<const hal::Sample> samples) noexcept;
   [[nodiscard]] std::size_t longest_run(std::size_t samples) const noexcept;
   void pass_run(std::span<const hal::Sample> samples, const SampleRun& run) noexcept;
-  void step_alone(const hal::Sample& sample) noexcept;
+  [[gnu::cold]] void step_alone(const hal::Sample& sample) noexcept;
   void estimate_alone(const estimator::MotorSample& motor,
                       const estimator::SampleGate::Output& gated) noexcept;
   void note_commands(std::span<const hal::Sample> samples) noexcept;
@@ -253,3 +253,5 @@ template <hal::Port P, class Sink>
 }
 
 }  // namespace cutforce::firmware
+
+#include "firmware/control_loop_make.hpp"  // IWYU pragma: export

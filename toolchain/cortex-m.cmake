@@ -3,7 +3,7 @@
 #   cortex-m7   double-precision FPU   mps2-an500
 #   cortex-m4   single-precision FPU   mps2-an386
 #   cortex-m33  single-precision FPU   mps2-an505, secure side
-# Never -Os: Eigen becomes six times slower with it and pulls in free().
+# For speed; what is compiled for size is named beside it (cutforce_for_size in options.cmake).
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR arm)
 set(CMAKE_CXX_COMPILER arm-none-eabi-g++)

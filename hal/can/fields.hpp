@@ -11,11 +11,14 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <type_traits>
+
+#include "hal/can/frame.hpp"
 
 namespace cutforce::hal::can {
 
@@ -59,6 +62,10 @@ struct Field {
     field.wraps = true;
     return field;
   }
+  // Each code is its value.
+  [[nodiscard]] constexpr bool is_whole() const noexcept {
+    return std::bit_cast<std::uint32_t>(offset) == 0 && units <= steps && units >= steps;
+  }
 };
 
 [[nodiscard]] constexpr std::uint32_t low_mask(unsigned bits) noexcept {
@@ -85,15 +92,26 @@ struct Field {
 }
 [[nodiscard]] constexpr Field flag(unsigned bit) noexcept { return unsigned_field(bit, 1); }
 
+// The same without a float, of a field whose codes are the values.
+[[nodiscard]] constexpr std::uint32_t whole_code_of(const Field& field,
+                                                    std::uint32_t value) noexcept {
+  const auto maximum = static_cast<std::uint32_t>(field.maximum);
+  const auto minimum = static_cast<std::uint32_t>(std::max<std::int32_t>(field.minimum, 0));
+  return std::clamp(value, minimum, maximum);
+}
+
 // The nearest code that the field allows; nothing for what is not a number.
 [[nodiscard]] constexpr std::optional<std::int32_t> code_of(const Field& field,
                                                             float value) noexcept {
-  if (value != value) return std::nullopt;
   const float exact = value * field.steps / field.units - field.offset;
-  if (!(exact > static_cast<float>(field.minimum))) return field.minimum;
+  if (!(exact > static_cast<float>(field.minimum))) {
+    if (value != value) return std::nullopt;
+    return field.minimum;
+  }
   if (!(exact < static_cast<float>(field.maximum))) return field.maximum;
   const auto whole = static_cast<std::int32_t>(exact);
   const float rest = exact - static_cast<float>(whole);
+  if (field.minimum >= 0) return whole + (rest >= 0.5F ? 1 : 0);
   return whole + (rest >= 0.5F ? 1 : 0) - (rest <= -0.5F ? 1 : 0);
 }
 
@@ -108,6 +126,7 @@ class FieldWriter {
   constexpr void operator()(const Field& field, const Value& value) noexcept {
     if constexpr (std::unsigned_integral<Value>) {
       if (field.wraps) return put(field, static_cast<std::uint32_t>(value));
+      if (field.is_whole()) return put(field, whole_code_of(field, value));
     }
     put_code(field, code_of(field, static_cast<float>(value)));
   }
@@ -117,10 +136,9 @@ class FieldWriter {
     put_code(field, std::nullopt);
   }
 
+  [[nodiscard]] constexpr std::uint64_t word() const noexcept { return word_; }
   [[nodiscard]] constexpr std::array<std::uint8_t, 8> bytes() const noexcept {
-    std::array<std::uint8_t, 8> bytes{};
-    for (unsigned k = 0; k < 8; ++k) bytes[k] = static_cast<std::uint8_t>(word_ >> (8U * k));
-    return bytes;
+    return bytes_of(word_);
   }
 
  private:
@@ -137,9 +155,8 @@ class FieldWriter {
 
 class FieldReader {
  public:
-  explicit constexpr FieldReader(const std::array<std::uint8_t, 8>& bytes) noexcept {
-    for (unsigned k = 0; k < 8; ++k) word_ |= static_cast<std::uint64_t>(bytes[k]) << (8U * k);
-  }
+  explicit constexpr FieldReader(const std::array<std::uint8_t, 8>& bytes) noexcept
+      : word_(word_of(bytes)) {}
 
   template <class Value>
   requires std::is_arithmetic_v<Value>
@@ -166,10 +183,15 @@ class FieldReader {
   template <class Value>
   constexpr void take(const Field& field, std::int32_t code, Value& value) noexcept {
     in_range_ = in_range_ && code >= field.minimum && code <= field.maximum;
-    value = static_cast<Value>(value_of(field, std::clamp(code, field.minimum, field.maximum)));
+    const std::int32_t held = std::clamp(code, field.minimum, field.maximum);
+    if (field.is_whole()) {
+      value = static_cast<Value>(held);
+    } else {
+      value = static_cast<Value>(value_of(field, held));
+    }
   }
 
-  std::uint64_t word_ = 0;
+  std::uint64_t word_;
   bool in_range_ = true;
 };
 

@@ -37,23 +37,41 @@ static_assert(covered<Job>() == kWhole);
 static_assert(covered<Phases>() == kWhole);
 static_assert(covered<Spindle>() == kWhole >> 11U);
 
+// Flattened, every field is a shift and a mask of its own.
 template <class Message>
-Frame pack_fields(const Message& message, std::uint8_t node) noexcept {
+[[gnu::flatten]] std::uint64_t word_of_fields(const Message& message) noexcept {
   FieldWriter writer;
   Layout<Message>::visit(writer, message);
+  return writer.word();
+}
+
+template <class Message>
+Frame pack_fields(const Message& message, std::uint8_t node) noexcept {
   Frame frame;
   frame.id = identifier(Layout<Message>::kBase, node);
   frame.length = Layout<Message>::kLength;
-  frame.data = writer.bytes();
+  put_word(frame.data, word_of_fields(message));
   return frame;
 }
 
 template <class Message>
 Frame pack_guarded(const Message& message, std::uint8_t node, std::uint8_t counter) noexcept {
   static_assert(Layout<Message>::kGuarded);
-  Frame frame = pack_fields(message, node);
-  seal(frame, counter);
+  Frame frame;
+  frame.id = identifier(Layout<Message>::kBase, node);
+  frame.length = Layout<Message>::kLength;
+  put_word(frame.data, sealed(word_of_fields(message), frame.id, counter));
   return frame;
+}
+
+// Likewise.
+template <class Message>
+[[gnu::flatten]] std::expected<Message, FrameError> message_in(const Frame& frame) noexcept {
+  FieldReader reader{frame.data};
+  Message message{};
+  Layout<Message>::visit(reader, message);
+  if (!reader.in_range()) return std::unexpected{FrameError::kRange};
+  return message;
 }
 
 template <class Message>
@@ -61,11 +79,7 @@ std::expected<Message, FrameError> unpack_fields(const Frame& frame) noexcept {
   if (frame.extended || frame.remote || frame.length != Layout<Message>::kLength) {
     return std::unexpected{FrameError::kFormat};
   }
-  FieldReader reader{frame.data};
-  Message message{};
-  Layout<Message>::visit(reader, message);
-  if (!reader.in_range()) return std::unexpected{FrameError::kRange};
-  return message;
+  return message_in<Message>(frame);
 }
 
 }  // namespace

@@ -9,10 +9,12 @@
 #include <string_view>
 
 #include "firmware/configuration.hpp"
+#include "firmware/configuration_supervisor.hpp"
 #include "hal/cortex_m/console.hpp"
 #include "hal/cortex_m/meter.hpp"
 #include "hal/cortex_m/semihosting.hpp"
 #include "hal/cortex_m/stream_port.hpp"
+#include "host_tests/benchmarks/control_tick_body.hpp"
 #include "host_tests/benchmarks/target_bodies.hpp"
 
 namespace cutforce::benchmarks {
@@ -122,6 +124,47 @@ bool count_samples(Meter& meter, std::string_view stream, const ControlLoop::Con
   // A run that is broken off would be cheap.
   constexpr std::uint32_t kAll = kRunIn + kCounted;
   return read && air_gap.taken() == kAll && fused.taken() == kAll;
+}
+
+// The same tick as a whole, and in its parts.
+bool count_control_tick(Meter& meter, std::string_view stream) {
+  firmware::Machine chosen = machine;
+  chosen.estimator = EstimatorName::kSynthesized;
+  chosen.controller = firmware::ControllerName::kPi;
+  chosen.supervisor_mode = firmware::SupervisorMode::kControl;
+  const auto config = firmware::make_loop_config(chosen);
+  if (!config) return false;
+  const auto supervisor = firmware::make_supervisor_config(chosen);
+  static constinit Place<SynthesizedTick> whole_place{};
+  static constinit Place<SynthesizedTick> parts_place{};
+  auto& whole = whole_place.make(*config, supervisor);
+  auto& parts = parts_place.make(*config, supervisor);
+  Counts tick;
+  std::array<Counts, 5> part;
+  const auto step = [&](const hal::Sample& sample, bool counted) {
+    const bool due = whole.add(sample);
+    keep(parts.add(sample));
+    if (!due) return;
+    const std::array<std::uint32_t, 5> used{
+        meter.count([&] { parts.close_window(); }), meter.count([&] { parts.find_force(); }),
+        meter.count([&] { parts.control(); }), meter.count([&] { parts.supervise(); }),
+        meter.count([&] { parts.pack(); })};
+    const std::uint32_t all = meter.count([&] { whole.step(); });
+    if (!counted) return;
+    tick.add(all);
+    for (std::size_t k = 0; k < part.size(); ++k) part[k].add(used[k]);
+  };
+  const bool read = over_stream(
+      stream, [&](const hal::Sample& sample) { step(sample, false); },
+      [&](std::span<const hal::Sample> block, bool counted) {
+        for (const hal::Sample& sample : block) step(sample, counted);
+      });
+  tick.show("control_tick_synthesized");
+  constexpr std::array<std::string_view, 5> kNames{"torque_path_window", "cutting_force",
+                                                   "control_path_pi", "supervisor_step",
+                                                   "override_frame"};
+  for (std::size_t k = 0; k < part.size(); ++k) part[k].show(kNames[k]);
+  return read && whole.in_control();
 }
 
 struct LoopNames {
@@ -250,6 +293,7 @@ int count_all() {
   show_calibration(meter);
   count_small(meter);
   bool sound = count_samples(meter, stream, *config);
+  sound = count_control_tick(meter, stream) && sound;
   for (const LoopNames& names : kLoops) sound = count_loop(meter, stream, names) && sound;
   count_controllers(meter, config->controller);
   return sound ? 0 : 1;
