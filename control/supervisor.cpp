@@ -14,6 +14,11 @@ using S = SupervisorState;
 }
 constexpr StateSet kLatched = from_to(S::kLinkLost, S::kDead);
 
+// By value: std::min takes addresses, and what is smaller than a register goes over the stack.
+[[nodiscard]] constexpr std::uint32_t lesser(std::uint32_t a, std::uint32_t b) noexcept {
+  return a < b ? a : b;
+}
+
 // Rounded; 0..254.
 [[nodiscard]] constexpr std::uint8_t byte(float percent) noexcept {
   return static_cast<std::uint8_t>(percent + 0.5F);
@@ -28,12 +33,15 @@ auto Supervisor::make(const Config& config) noexcept -> std::expected<Supervisor
 
 Supervisor::Supervisor(const Config& config) noexcept
     : config_(config),
-      link_steps_(steps(config.link_timeout_s)),
+      link_steps_(config.link_required ? steps(config.link_timeout_s) : kNever),
       samples_steps_(steps(config.samples_timeout_s)),
       estimate_steps_(steps(config.estimate_timeout_s)),
       release_steps_(steps(config.hold_release_s)),
       window_part_steps_(std::max<std::uint32_t>(steps(config.overrun_window_s) / 8, 1U)),
-      missed_most_(config.overrun_ratio * static_cast<float>(steps(config.overrun_window_s))) {
+      missed_most_(config.overrun_ratio * static_cast<float>(steps(config.overrun_window_s))),
+      edges_allowed_(config.mode == SupervisorMode::kControl ? kArmBit | kControlBit | kResetBit
+                                                             : kArmBit | kResetBit),
+      neutral_pct_(byte(config.neutral_pct)) {
   state_ = {.state = S::kBoot,
             .reason = Reason::kNone,
             .override_pct = byte(config.neutral_pct),
@@ -59,7 +67,8 @@ std::uint32_t Supervisor::steps(float time_s) const noexcept {
 }
 
 // The fall of a latched state, from its beginning.
-void Supervisor::enter(SupervisorState before, bool force_over) noexcept {
+[[gnu::always_inline]] inline void Supervisor::enter(SupervisorState before,
+                                                     bool force_over) noexcept {
   const S now = state_.state;
   if (before == S::kProtect) state_.forces_over = 0;
   if (!is_in(now, kLatched)) {
@@ -83,14 +92,15 @@ void Supervisor::enter(SupervisorState before, bool force_over) noexcept {
 }
 
 // In kHold by these the controller is off: what it would see is not the force of a cut.
-bool Supervisor::controller_off() const noexcept {
+[[gnu::always_inline]] inline bool Supervisor::controller_off() const noexcept {
   return state_.reason == Reason::kInhibited || state_.reason == Reason::kThreading;
 }
 
-std::uint8_t Supervisor::following(std::uint8_t controller_pct) const noexcept {
-  const std::uint8_t last_pct = state_.override_pct;
-  const std::uint8_t neutral_pct = byte(config_.neutral_pct);
-  const std::uint8_t wanted_pct = std::min<std::uint8_t>(controller_pct, 254);
+[[gnu::always_inline]] inline std::uint32_t Supervisor::following(
+    std::uint32_t controller_pct) const noexcept {
+  const std::uint32_t last_pct = state_.override_pct;
+  const std::uint32_t neutral_pct = neutral_pct_;
+  const std::uint32_t wanted_pct = lesser(controller_pct, 254);
   switch (state_.state) {
     case S::kBoot:
     case S::kSelfTest:
@@ -98,11 +108,11 @@ std::uint8_t Supervisor::following(std::uint8_t controller_pct) const noexcept {
       return last_pct;
     case S::kReady:
     case S::kMonitor:
-      return std::min(wanted_pct, std::max(last_pct, neutral_pct));
+      return lesser(wanted_pct, last_pct > neutral_pct ? last_pct : neutral_pct);
     case S::kControl:
       return wanted_pct;
     case S::kHold:
-      return std::min(last_pct, controller_off() ? neutral_pct : wanted_pct);
+      return lesser(last_pct, controller_off() ? neutral_pct : wanted_pct);
     case S::kLinkLost:
     case S::kProtect:
     case S::kSafe:
@@ -112,7 +122,7 @@ std::uint8_t Supervisor::following(std::uint8_t controller_pct) const noexcept {
   return byte(state_.position_pct);
 }
 
-Permission Supervisor::permission() const noexcept {
+[[gnu::always_inline]] inline Permission Supervisor::permission() const noexcept {
   const bool hold = state_.state == S::kHold;
   const bool idle = is_in(state_.state, from_to(S::kReady, S::kMonitor));
   const bool control = state_.state == S::kControl;
@@ -125,14 +135,7 @@ Permission Supervisor::permission() const noexcept {
 }
 
 auto Supervisor::step(const Input& input) noexcept -> Output {
-  note_ages(input);
-  note_force(input);
-  note_missed(input.missed_ticks);
-  const EventSet causes = holds(input);
-  state_.calm_steps = causes == 0 ? std::min(state_.calm_steps + 1, kNever) : 0;
-  const EventSet events =
-      faults(input) | causes | requests(input) | when(state_.calm_steps >= release_steps_, kCalm);
-
+  const EventSet events = this->events(input);
   const S before = state_.state;
   const Reason reason = state_.reason;
   if (const Transition* row = transition(before, events); row != nullptr) {
@@ -141,13 +144,12 @@ auto Supervisor::step(const Input& input) noexcept -> Output {
   }
   enter(before, (events & kForceOver) != 0);
   const bool moved = state_.state != before;
-  const std::uint8_t last_pct = state_.override_pct;
-  const std::uint8_t wanted_pct = following(input.override_pct);
-  state_.override_pct = moved ? std::min(wanted_pct, last_pct) : wanted_pct;
+  const std::uint32_t wanted_pct = following(input.override_pct);
+  state_.override_pct =
+      static_cast<std::uint8_t>(moved ? lesser(wanted_pct, state_.override_pct) : wanted_pct);
 
-  const bool arm_low = !input.arm && (before != S::kLinkLost || (events & kLinkOk) != 0);
-  const std::uint32_t lows =
-      when(arm_low, kArmBit) | when(!input.control, kControlBit) | when(!input.reset, kResetBit);
+  std::uint32_t lows = ~buttons(input) & (kArmBit | kControlBit | kResetBit);
+  if (before == S::kLinkLost && (events & kLinkOk) == 0) lows &= ~kArmBit;
   state_.lows = static_cast<std::uint8_t>(moved ? 0 : lows);
 
   const S now = state_.state;

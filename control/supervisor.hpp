@@ -196,23 +196,34 @@ class Supervisor {
   [[nodiscard]] Output step(const Input& input) noexcept;
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
-  void restore(const State& state) noexcept { state_ = state; }
+  void restore(const State& state) noexcept {
+    state_ = state;
+    sum_missed();
+  }
 
  private:
   explicit Supervisor(const Config& config) noexcept;
 
   [[nodiscard]] std::uint32_t steps(float time_s) const noexcept;
+  // In supervisor_events.cpp: what happens in this step, EventSet of supervisor_table.hpp.
+  [[nodiscard]] std::uint32_t events(const Input& input) noexcept;
   void note_ages(const Input& input) noexcept;
-  void note_force(const Input& input) noexcept;
-  void note_missed(std::uint32_t missed_ticks) noexcept;
-  [[nodiscard]] bool overran() const noexcept;
+  [[nodiscard]] bool note_missed(std::uint32_t missed_ticks) noexcept;
+  void slide_window(std::uint32_t missed_ticks) noexcept;
+  void sum_missed() noexcept;
   [[nodiscard]] bool protect_clear(const Input& input) const noexcept;
   [[nodiscard]] bool safe_clear(const Input& input) const noexcept;
   [[nodiscard]] std::uint32_t faults(const Input& input) const noexcept;
-  [[nodiscard]] std::uint32_t holds(const Input& input) const noexcept;
+  [[nodiscard]] std::uint32_t tests(const Input& input) const noexcept;
+  [[nodiscard]] std::uint32_t holds(const Input& input, bool overran) const noexcept;
   [[nodiscard]] std::uint32_t requests(const Input& input) const noexcept;
+  // Which are pressed now, bit by bit.
+  [[nodiscard]] static constexpr std::uint32_t buttons(const Input& input) noexcept {
+    return (input.arm ? kArmBit : 0U) | (input.control ? kControlBit : 0U) |
+           (input.reset ? kResetBit : 0U);
+  }
   void enter(SupervisorState before, bool force_over) noexcept;
-  [[nodiscard]] std::uint8_t following(std::uint8_t controller_pct) const noexcept;
+  [[nodiscard]] std::uint32_t following(std::uint32_t controller_pct) const noexcept;
   [[nodiscard]] bool controller_off() const noexcept;
   [[nodiscard]] Permission permission() const noexcept;
 
@@ -223,6 +234,9 @@ class Supervisor {
   std::uint32_t release_steps_;
   std::uint32_t window_part_steps_;
   float missed_most_;
+  std::uint32_t edges_allowed_;  // of the buttons; advising, there is none of kControlBit
+  std::uint8_t neutral_pct_;
+  bool missed_too_many_ = false;  // in the window: the sum of State::missed against missed_most_
   State state_{};
 };
 
