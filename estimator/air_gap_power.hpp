@@ -97,7 +97,7 @@ class AirGapPower {
   // The same in two parts: true with the last sample of a window, which close_window() then ends.
   [[nodiscard]] [[gnu::always_inline]] bool add(const MotorSample& sample,
                                                 float electrical_rad_s) noexcept;
-  [[nodiscard]] Output close_window() noexcept;
+  [[nodiscard]] [[gnu::always_inline]] Output close_window() noexcept;
 
   // Drops the window so far. For gaps in the signals.
   constexpr void restart() noexcept { state_ = {}; }
@@ -157,6 +157,23 @@ inline bool AirGapPower::add(const MotorSample& sample, float electrical_rad_s) 
   state_.last_airgap_w = airgap;
   state_.last_square_a2 = square;
   return state_.sample >= config_.samples_per_window;
+}
+
+inline auto AirGapPower::close_window() noexcept -> Output {
+  const float mean = state_.airgap_w / state_.weight;
+  const float square = state_.current_square_a2 / state_.weight;
+  const Output output{
+      .airgap_power_w = mean,
+      .input_power_w = mean + loss_ohm_ * square,
+      .current_square_a2 = square,
+      // (E25): scatter from first differences, which a load step within the window hardly moves.
+      .noise_variance_w2 = 0.5F * state_.difference_square_w2 / (state_.weight * state_.weight)};
+  state_.sample = 0;
+  state_.weight = 0.0F;
+  state_.airgap_w = 0.0F;
+  state_.current_square_a2 = 0.0F;
+  state_.difference_square_w2 = 0.0F;
+  return output;
 }
 
 static_assert(std::is_trivially_copyable_v<AirGapPower>);

@@ -13,6 +13,22 @@ constexpr float kResidualVariance = 1.2F;  // of the torque, per variance left a
 
 }  // namespace
 
+IdleTare::IdleTare(const Config& config) noexcept
+    : config_(config),
+      wait_windows_(static_cast<std::uint32_t>(config.wait_s / config.period_s + 0.5F)),
+      gain_(config.period_s / (config.period_s + config.memory_s)) {
+  state_.coulomb_nm = config.coulomb_nm;
+  state_.viscous_nm_s_rad = config.viscous_nm_s_rad;
+  // Until idle was seen, the band is at its upper limit.
+  state_.noise_variance_nm2 = config.band_most_nm * config.band_most_nm / 25.0F;
+  note_noise();
+}
+
+void IdleTare::note_noise() noexcept {
+  noise_sigma_nm_ = std::sqrt(state_.noise_variance_nm2);
+  band_nm_ = std::clamp(kBandSigmas * noise_sigma_nm_, config_.band_least_nm, config_.band_most_nm);
+}
+
 auto IdleTare::step(const Input& input) noexcept -> Output {
   state_.age_s += config_.period_s;
   if (!input.valid) {
@@ -35,21 +51,12 @@ auto IdleTare::step(const Input& input) noexcept -> Output {
   return publish(input, taring);
 }
 
-auto IdleTare::idle_torque(float speed_rad_s) const noexcept -> float {
-  return state_.coulomb_nm + state_.viscous_nm_s_rad * speed_rad_s;  // (E44)
-}
-
-auto IdleTare::band() const noexcept -> float {
-  return std::clamp(kBandSigmas * std::sqrt(state_.noise_variance_nm2), config_.band_least_nm,
-                    config_.band_most_nm);
-}
-
 // How far from the expected idle torque a torque at rest may be and still be idle.
 auto IdleTare::reach(const Input& input) const noexcept -> float {
-  const float first = band() + 2.0F * config_.idle_sigma_nm;
+  const float first = band_nm_ + 2.0F * config_.idle_sigma_nm;
   if (state_.acquired == 0) return first;
   const float moved = std::abs(input.speed_rad_s - state_.tare_speed_rad_s);
-  const float aged = band() + 2.0F * config_.aging_nm_sqrt_s * std::sqrt(state_.age_s) +
+  const float aged = band_nm_ + 2.0F * config_.aging_nm_sqrt_s * std::sqrt(state_.age_s) +
                      2.0F * config_.viscous_sigma_nm_s_rad * moved;
   return std::min(first, aged);
 }
@@ -65,7 +72,7 @@ void IdleTare::rest(const Input& input) noexcept {
   state_.speed_rad_s = input.speed_rad_s;
   state_.steady_windows = steady ? state_.steady_windows + 1 : 0;
   const float torque = input.load_torque_nm;
-  if (!steady || state_.recent == 0 || !(std::abs(torque - state_.rest_torque_nm) <= band())) {
+  if (!steady || state_.recent == 0 || !(std::abs(torque - state_.rest_torque_nm) <= band_nm_)) {
     state_.rest_windows = 0;
     state_.recent = 0;
     state_.rest_torque_nm = torque;
@@ -99,7 +106,7 @@ auto IdleTare::touches(const Input& input) const noexcept -> bool {
       reach(input) + 2.0F * config_.inertia_sigma_ratio * std::abs(input.inertia_torque_nm);
   if (input.load_torque_nm - idle > allowed) return true;
   return state_.acquired != 0 && state_.recent >= 4 &&
-         recent_mean() - idle > allowed - 0.5F * band();
+         recent_mean() - idle > allowed - 0.5F * band_nm_;
 }
 
 void IdleTare::decide_alone(const Input& input) noexcept {
@@ -151,12 +158,12 @@ void IdleTare::tare(const Input& input) noexcept {
     state_.coulomb_nm += rest_above;
   } else {
     const float limit = config_.drift_nm_s * config_.period_s;
-    const float gain = config_.period_s / (config_.period_s + config_.memory_s);
-    state_.coulomb_nm += std::clamp(gain * (oldest - idle), -limit, limit);  // (E45)
+    state_.coulomb_nm += std::clamp(gain_ * (oldest - idle), -limit, limit);  // (E45)
   }
   const float residual = input.load_torque_nm - state_.rest_torque_nm;
   state_.noise_variance_nm2 +=
       kNoiseGain * (kResidualVariance * residual * residual - state_.noise_variance_nm2);
+  note_noise();
   state_.tare_speed_rad_s = input.speed_rad_s;
   state_.age_s = 0.0F;
   state_.acquired = 1;
@@ -168,6 +175,7 @@ void IdleTare::tare(const Input& input) noexcept {
 }
 
 void IdleTare::close_idle() noexcept {
+  if (state_.idle_windows == 0) return;
   if (state_.idle_windows >= wait_windows_) regress();
   state_.idle_windows = 0;
   state_.idle_torque_nm = 0.0F;
@@ -198,17 +206,16 @@ void IdleTare::regress() noexcept {
 
 auto IdleTare::publish(const Input& input, bool taring) const noexcept -> Output {
   const bool acquired = state_.acquired != 0;
-  const float gain = config_.period_s / (config_.period_s + config_.memory_s);
   const float moved =
       config_.viscous_sigma_nm_s_rad * (input.speed_rad_s - state_.tare_speed_rad_s);
-  const float variance = state_.noise_variance_nm2 * gain +
+  const float variance = state_.noise_variance_nm2 * gain_ +
                          config_.aging_nm_sqrt_s * config_.aging_nm_sqrt_s * state_.age_s +
                          moved * moved;  // (E46)
   return {.coulomb_nm = state_.coulomb_nm,
           .viscous_nm_s_rad = state_.viscous_nm_s_rad,
           .idle_torque_nm = idle_torque(input.speed_rad_s),
           .sigma_nm = acquired ? std::sqrt(variance) : config_.idle_sigma_nm,
-          .noise_sigma_nm = acquired ? std::sqrt(state_.noise_variance_nm2) : 0.0F,
+          .noise_sigma_nm = acquired ? noise_sigma_nm_ : 0.0F,
           .age_s = state_.age_s,
           .in_cut = state_.mode == Mode::kCut,
           .taring = taring,

@@ -111,8 +111,7 @@ class IdleTare {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static constexpr std::expected<IdleTare, ConfigError> make(
-      const Config& config) noexcept {
+  [[nodiscard]] static std::expected<IdleTare, ConfigError> make(const Config& config) noexcept {
     if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
     return IdleTare{config};
   }
@@ -121,13 +120,18 @@ class IdleTare {
   [[nodiscard]] Output step(const Input& input) noexcept;
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
-  constexpr void restore(const State& state) noexcept { state_ = state; }
+  void restore(const State& state) noexcept {
+    state_ = state;
+    note_noise();
+  }
 
  private:
-  explicit constexpr IdleTare(const Config& config) noexcept;
+  explicit IdleTare(const Config& config) noexcept;
 
-  [[nodiscard]] float idle_torque(float speed_rad_s) const noexcept;
-  [[nodiscard]] float band() const noexcept;
+  void note_noise() noexcept;
+  [[nodiscard]] float idle_torque(float speed_rad_s) const noexcept {
+    return state_.coulomb_nm + state_.viscous_nm_s_rad * speed_rad_s;  // (E44)
+  }
   [[nodiscard]] float reach(const Input& input) const noexcept;
   [[nodiscard]] float recent_mean() const noexcept;
   void rest(const Input& input) noexcept;
@@ -143,6 +147,9 @@ class IdleTare {
 
   Config config_;
   std::uint32_t wait_windows_;
+  float gain_;            // of the tare, a window
+  float noise_sigma_nm_;  // of State::noise_variance_nm2, which moves in idle only
+  float band_nm_;         // likewise
   State state_{};
 };
 
@@ -175,15 +182,6 @@ constexpr std::expected<void, IdleTare::ConfigError> IdleTare::Config::check() c
     return std::unexpected{ConfigError::kSpeeds};
   }
   return {};
-}
-
-constexpr IdleTare::IdleTare(const Config& config) noexcept
-    : config_(config),
-      wait_windows_(static_cast<std::uint32_t>(config.wait_s / config.period_s + 0.5F)) {
-  state_.coulomb_nm = config.coulomb_nm;
-  state_.viscous_nm_s_rad = config.viscous_nm_s_rad;
-  // Until idle was seen, the band is at its upper limit.
-  state_.noise_variance_nm2 = config.band_most_nm * config.band_most_nm / 25.0F;
 }
 
 }  // namespace cutforce::estimator

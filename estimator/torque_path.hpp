@@ -142,7 +142,13 @@ class TorquePath {
   }
   // The same in two parts: true with the last sample of a window, which close_window() then ends.
   [[nodiscard]] [[gnu::always_inline]] bool add(const Input& input) noexcept;
-  [[nodiscard]] Output close_window(Feed feed) noexcept;
+  [[nodiscard]] Output close_window(Feed feed) noexcept {
+    Output output;
+    close_window(feed, output);
+    return output;
+  }
+  // Into what is kept: every field is written.
+  void close_window(Feed feed, Output& output) noexcept;
 
   // Samples are missing: the window begins anew, what was learned stays.
   void restart() noexcept;
@@ -160,29 +166,43 @@ class TorquePath {
     IdleTare tare;
     SynthesizedMonitor monitor;
   };
-  struct Window;    // means over the window, in the direction of rotation
-  struct Estimate;  // one torque with its share of the uncertainty
-  struct Load;      // what inertia and friction take
+  // Of Config, what a window reads, with products made once.
+  struct Settings {
+    Method method;
+    Speed speed;
+    std::uint32_t samples_per_window;
+    float count;  // of samples in a window
+    float pole_pairs;
+    float slip_ohm;            // 1.5 p^2, under R_r P_g in (E29)
+    float loss_sigma_ohm;      // 1.5 R_s and its relative uncertainty
+    float speed_variance_nm2;  // of inertia torque, from two noisy speeds
+    float rotor_resistance_ohm;
+    float rated_torque_nm;
+    float rated_slip_ratio;
+    float inertia_sigma_ratio;
+    float minimum_speed_rad_s;
+  };
+  // In torque_path_window.cpp, where a window is closed.
+  struct Window;  // means over the window, in the direction of rotation
+  struct Load;    // what inertia and friction take
+  struct Choice;  // which power, and its torque
 
   explicit TorquePath(const Config& config) noexcept;
 
   [[nodiscard]] Window window(const AirGapPower::Output& power,
                               const SynchronousSpeed::Output& synchronous) noexcept;
   void find_speeds(const SynchronousSpeed::Output& synchronous, Window& window) const noexcept;
-  void estimate_torque(const Window& window, Feed feed, Output& output) noexcept;
-  [[nodiscard]] Estimate computed(const Window& window) const noexcept;
-  [[nodiscard]] Estimate measured(const Window& window) const noexcept;
-  [[nodiscard]] Estimate choose(const Window& window, const Estimate& computed,
-                                const Estimate& measured, Origin& origin) noexcept;
   [[nodiscard]] Load follow_load(const Window& window, float airgap_torque_nm, Feed feed) noexcept;
-  void publish(const Window& window, const Load& load, const Estimate& chosen,
-               Output& output) noexcept;
+  [[nodiscard]] Choice choose(const Window& window, float leading_nm) noexcept;
   [[nodiscard]] float torque_variance(const Window& window, const Load& load,
-                                      const Estimate& estimate) const noexcept;
+                                      const Choice& chosen) const noexcept;
+  void publish_torque(const Window& window, const Load& load, const Choice& chosen,
+                      Output& output) noexcept;
 
-  Config config_;
-  Blocks blocks_;
+  // In this order for the short reach of a Cortex-M7's floats, see firmware/control_loop.hpp.
+  Settings settings_;
   Sums sums_{};
+  Blocks blocks_;
 };
 
 inline bool TorquePath::add(const Input& input) noexcept {

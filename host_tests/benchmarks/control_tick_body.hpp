@@ -44,7 +44,7 @@ class SynthesizedTick {
                       .feed = estimator::Feed::kUnknown});
   }
 
-  void close_window() noexcept { torque_ = path_.close_window(estimator::Feed::kUnknown); }
+  void close_window() noexcept { path_.close_window(estimator::Feed::kUnknown, torque_); }
   void find_force() noexcept {
     force_ = cutting_force_.step({.cutting_torque_nm = torque_.cutting_torque_nm,
                                   .cutting_torque_sigma_nm = torque_.cutting_torque_sigma_nm,
