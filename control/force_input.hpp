@@ -122,9 +122,11 @@ class ForceInput {
   [[nodiscard]] constexpr ForceRefusal refuse(const Input& input) const noexcept {
     if (!input.valid) return ForceRefusal::kMissing;
     if (input.age_ticks > config_.stale_ticks) return ForceRefusal::kStale;
-    if (!(input.force_n >= -kLargest && input.force_n <= kLargest)) return ForceRefusal::kNotFinite;
+    if (!(__builtin_fabsf(input.force_n) <= kLargest)) return ForceRefusal::kNotFinite;
     if (!(input.force_sigma_n >= 0.0F && input.force_sigma_n <= kLargest))
       return ForceRefusal::kSigma;
+    if (input.force_n >= 0.0F) [[likely]]
+      return ForceRefusal::kNone;
     const float excused_n = std::min(3.0F * std::min(input.force_sigma_n, config_.highest_n),
                                      config_.negative_tolerance_n);  // (C5)
     if (!(input.force_n >= -excused_n)) return ForceRefusal::kNegative;

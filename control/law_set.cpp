@@ -4,28 +4,6 @@
 
 namespace cutforce::control {
 
-// The visitor sees the law in charge and that law's config.
-template <class Set, class Visitor>
-auto LawSet::visit(Set& set, const Visitor& visitor) {
-  switch (set.in_charge_) {
-    case LawName::kPi:
-      break;
-    case LawName::kPid:
-      return visitor(set.pid_, set.config_.pid);
-    case LawName::kPoleAssignment:
-      return visitor(set.pole_assignment_, set.config_.pole_assignment);
-    case LawName::kMrac:
-      return visitor(set.mrac_, set.config_.mrac);
-    case LawName::kVariableGain:
-      return visitor(set.variable_gain_, set.config_.variable_gain);
-    case LawName::kFuzzy:
-      return visitor(set.fuzzy_, set.config_.fuzzy);
-    case LawName::kPredictive:
-      return visitor(set.predictive_, set.config_.predictive);
-  }
-  return visitor(set.pi_, set.config_.pi);
-}
-
 namespace {
 
 // Apart, so that the copy is not on the stack below a step of the deepest law.
@@ -69,13 +47,8 @@ auto LawSet::make(const Config& config) noexcept -> std::expected<LawSet, Config
   return LawSet{config};
 }
 
-auto LawSet::step(const Input& input) noexcept -> Output {
-  if (joining_ && input.mode == LawMode::kHold) return law_answer(input.override_applied_pct);
-  if (joining_) join(input);
-  return visit(*this, [&](auto& law, const auto& /*config*/) { return law.step(input); });
-}
-
-void LawSet::join(const Input& input) noexcept {
+bool LawSet::join(const Input& input) noexcept {
+  if (input.mode == LawMode::kHold) return false;
   joining_ = false;
   Input still = input;
   still.mode = LawMode::kTrack;
@@ -88,17 +61,13 @@ void LawSet::join(const Input& input) noexcept {
     }
     for (int k = 0; k < kCatchUpTicks; ++k) std::ignore = law.step(still);
   });
+  return true;
 }
 
 void LawSet::select(LawName name) noexcept {
   if (name == in_charge_ || static_cast<std::size_t>(name) >= kLawCount) return;
   in_charge_ = name;
   joining_ = true;
-}
-
-bool LawSet::foresees() const noexcept {
-  return visit(*this,
-               [](const auto& law, const auto& /*config*/) { return control::foresees(law); });
 }
 
 auto LawSet::state() const noexcept -> State {

@@ -104,7 +104,8 @@ class LawSet {
   // config has passed check(): every law can be made.
   explicit LawSet(const Config& config) noexcept;
 
-  void join(const Input& input) noexcept;
+  // Fails iff the force is not fresh.
+  [[nodiscard]] bool join(const Input& input) noexcept;
   template <class Set, class Visitor>
   static auto visit(Set& set, const Visitor& visitor);
 
@@ -119,6 +120,40 @@ class LawSet {
   LawName in_charge_;
   bool joining_ = false;
 };
+
+// The visitor sees the law in charge and that law's config.
+template <class Set, class Visitor>
+auto LawSet::visit(Set& set, const Visitor& visitor) {
+  switch (set.in_charge_) {
+    case LawName::kPi:
+      break;
+    case LawName::kPid:
+      return visitor(set.pid_, set.config_.pid);
+    case LawName::kPoleAssignment:
+      return visitor(set.pole_assignment_, set.config_.pole_assignment);
+    case LawName::kMrac:
+      return visitor(set.mrac_, set.config_.mrac);
+    case LawName::kVariableGain:
+      return visitor(set.variable_gain_, set.config_.variable_gain);
+    case LawName::kFuzzy:
+      return visitor(set.fuzzy_, set.config_.fuzzy);
+    case LawName::kPredictive:
+      return visitor(set.predictive_, set.config_.predictive);
+  }
+  return visitor(set.pi_, set.config_.pi);
+}
+
+inline auto LawSet::step(const Input& input) noexcept -> Output {
+  if (joining_) [[unlikely]] {
+    if (!join(input)) return law_answer(input.override_applied_pct);
+  }
+  return visit(*this, [&](auto& law, const auto& /*config*/) { return law.step(input); });
+}
+
+inline bool LawSet::foresees() const noexcept {
+  return visit(*this,
+               [](const auto& law, const auto& /*config*/) { return control::foresees(law); });
+}
 
 static_assert(Law<LawSet>);
 static_assert(std::is_standard_layout_v<LawSet::State>);

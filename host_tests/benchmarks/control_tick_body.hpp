@@ -21,13 +21,13 @@ class SynthesizedTick {
  public:
   SynthesizedTick(const firmware::ControlLoop::Config& config,
                   const control::Supervisor::Config& supervisor)
-      : gate_(*estimator::SampleGate::make(config.gate)),
-        front_end_(*estimator::FrontEnd::make(config.front_end)),
-        path_(estimator::TorquePath::make_checked(config.path)),
+      : diameter_m_(config.fixed_diameter_m),
         cutting_force_(*estimator::CuttingForce::make(config.force)),
-        controller_(control::ControlPath::make_checked(config.controller)),
         supervisor_(*control::Supervisor::make(supervisor)),
-        diameter_m_(config.fixed_diameter_m) {
+        controller_(control::ControlPath::make_checked(config.controller)),
+        path_(estimator::TorquePath::make_checked(config.path)),
+        gate_(*estimator::SampleGate::make(config.gate)),
+        front_end_(*estimator::FrontEnd::make(config.front_end)) {
     take_control();
   }
 
@@ -110,13 +110,6 @@ class SynthesizedTick {
     supervision_ = supervisor_.step(health_);
   }
 
-  estimator::SampleGate gate_;
-  estimator::FrontEnd front_end_;
-  estimator::TorquePath path_;
-  estimator::CuttingForce cutting_force_;
-  control::ControlPath controller_;
-  control::Supervisor supervisor_;
-  float diameter_m_;
   control::Supervisor::Input health_{.self_test_done = true,
                                      .self_test_passed = true,
                                      .checks_passed = true,
@@ -147,6 +140,13 @@ class SynthesizedTick {
   control::Supervisor::Output supervision_{};
   hal::can::Frame frame_{};
   std::uint8_t counter_ = 0;
+  float diameter_m_;
+  estimator::CuttingForce cutting_force_;
+  control::Supervisor supervisor_;
+  control::ControlPath controller_;
+  estimator::TorquePath path_;
+  estimator::SampleGate gate_;
+  estimator::FrontEnd front_end_;
 };
 
 }  // namespace cutforce::benchmarks
