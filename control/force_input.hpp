@@ -86,8 +86,7 @@ class ForceInput {
     ForceRefusal refusal = refuse(input);
     if (refusal == ForceRefusal::kNone) {
       state_.refused_ticks = 0;
-      state_.good_ticks = std::min(state_.good_ticks + 1, kTicksLimit);
-      if (state_.outcome == ForceOutcome::kLost && state_.good_ticks < config_.recover_ticks) {
+      if (state_.outcome == ForceOutcome::kLost && ++state_.good_ticks < config_.recover_ticks) {
         refusal = ForceRefusal::kRecovering;
       } else {
         state_.outcome = ForceOutcome::kFresh;

@@ -4,12 +4,40 @@
 
 namespace cutforce::control {
 
+// The visitor sees the law in charge and that law's config.
+template <class Set, class Visitor>
+auto LawSet::visit(Set& set, const Visitor& visitor) {
+  switch (set.in_charge_) {
+    case LawName::kPi:
+      break;
+    case LawName::kPid:
+      return visitor(set.pid_, set.config_.pid);
+    case LawName::kPoleAssignment:
+      return visitor(set.pole_assignment_, set.config_.pole_assignment);
+    case LawName::kMrac:
+      return visitor(set.mrac_, set.config_.mrac);
+    case LawName::kVariableGain:
+      return visitor(set.variable_gain_, set.config_.variable_gain);
+    case LawName::kFuzzy:
+      return visitor(set.fuzzy_, set.config_.fuzzy);
+    case LawName::kPredictive:
+      return visitor(set.predictive_, set.config_.predictive);
+  }
+  return visitor(set.pi_, set.config_.pi);
+}
+
 namespace {
 
 // Apart, so that the copy is not on the stack below a step of the deepest law.
 template <class L>
 [[gnu::noinline]] void start_anew(L& law, const typename L::Config& config) noexcept {
   law = *L::make(config);
+}
+
+// Once for each law, whoever calls it.
+template <class L>
+[[gnu::noinline]] LawOutput step_of(L& law, const LawInput& input) noexcept {
+  return law.step(input);
 }
 
 }  // namespace
@@ -32,7 +60,7 @@ auto LawSet::Config::check() const noexcept -> std::expected<void, ConfigError> 
 }
 
 LawSet::LawSet(const Config& config) noexcept
-    : config_(config),
+    : in_charge_(config.in_charge),
       pi_(*PiController::make(config.pi)),
       pid_(*Pid::make(config.pid)),
       pole_assignment_(*PoleAssignment::make(config.pole_assignment)),
@@ -40,15 +68,20 @@ LawSet::LawSet(const Config& config) noexcept
       variable_gain_(*VariableGain::make(config.variable_gain)),
       fuzzy_(*FuzzyPi::make(config.fuzzy)),
       predictive_(Predictive::make_checked(config.predictive)),
-      in_charge_(config.in_charge) {}
+      config_(config) {}
 
 auto LawSet::make(const Config& config) noexcept -> std::expected<LawSet, ConfigError> {
   if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
   return LawSet{config};
 }
 
-bool LawSet::join(const Input& input) noexcept {
-  if (input.mode == LawMode::kHold) return false;
+auto LawSet::step_any(const Input& input) noexcept -> Output {
+  if (joining_ && input.mode == LawMode::kHold) return law_answer(input.override_applied_pct);
+  if (joining_) join(input);
+  return visit(*this, [&](auto& law, const auto& /*config*/) { return step_of(law, input); });
+}
+
+void LawSet::join(const Input& input) noexcept {
   joining_ = false;
   Input still = input;
   still.mode = LawMode::kTrack;
@@ -59,15 +92,19 @@ bool LawSet::join(const Input& input) noexcept {
     } else {
       start_anew(law, config);
     }
-    for (int k = 0; k < kCatchUpTicks; ++k) std::ignore = law.step(still);
+    for (int k = 0; k < kCatchUpTicks; ++k) std::ignore = step_of(law, still);
   });
-  return true;
 }
 
 void LawSet::select(LawName name) noexcept {
   if (name == in_charge_ || static_cast<std::size_t>(name) >= kLawCount) return;
   in_charge_ = name;
   joining_ = true;
+}
+
+bool LawSet::foresees() const noexcept {
+  return visit(*this,
+               [](const auto& law, const auto& /*config*/) { return control::foresees(law); });
 }
 
 auto LawSet::state() const noexcept -> State {

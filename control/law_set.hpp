@@ -90,7 +90,7 @@ class LawSet {
   // Of a config that check() accepts, made where it stays.
   [[nodiscard]] static LawSet make_checked(const Config& config) noexcept { return LawSet{config}; }
 
-  [[nodiscard]] Output step(const Input& input) noexcept;
+  [[nodiscard]] [[gnu::always_inline]] Output step(const Input& input) noexcept;
 
   // Puts `name` in charge from the next step on. The law that is in charge already goes on.
   void select(LawName name) noexcept;
@@ -104,12 +104,14 @@ class LawSet {
   // config has passed check(): every law can be made.
   explicit LawSet(const Config& config) noexcept;
 
-  // Fails iff the force is not fresh.
-  [[nodiscard]] bool join(const Input& input) noexcept;
+  [[nodiscard]] Output step_any(const Input& input) noexcept;
+  void join(const Input& input) noexcept;
   template <class Set, class Visitor>
   static auto visit(Set& set, const Visitor& visitor);
 
-  Config config_;
+  // The small ones first, within a short reach.
+  LawName in_charge_;
+  bool joining_ = false;
   PiController pi_;
   Pid pid_;
   PoleAssignment pole_assignment_;
@@ -117,42 +119,14 @@ class LawSet {
   VariableGain variable_gain_;
   FuzzyPi fuzzy_;
   Predictive predictive_;
-  LawName in_charge_;
-  bool joining_ = false;
+  Config config_;
 };
 
-// The visitor sees the law in charge and that law's config.
-template <class Set, class Visitor>
-auto LawSet::visit(Set& set, const Visitor& visitor) {
-  switch (set.in_charge_) {
-    case LawName::kPi:
-      break;
-    case LawName::kPid:
-      return visitor(set.pid_, set.config_.pid);
-    case LawName::kPoleAssignment:
-      return visitor(set.pole_assignment_, set.config_.pole_assignment);
-    case LawName::kMrac:
-      return visitor(set.mrac_, set.config_.mrac);
-    case LawName::kVariableGain:
-      return visitor(set.variable_gain_, set.config_.variable_gain);
-    case LawName::kFuzzy:
-      return visitor(set.fuzzy_, set.config_.fuzzy);
-    case LawName::kPredictive:
-      return visitor(set.predictive_, set.config_.predictive);
-  }
-  return visitor(set.pi_, set.config_.pi);
-}
-
+// PI is a few lines, and inlined: its input is never put together in memory.
 inline auto LawSet::step(const Input& input) noexcept -> Output {
-  if (joining_) [[unlikely]] {
-    if (!join(input)) return law_answer(input.override_applied_pct);
-  }
-  return visit(*this, [&](auto& law, const auto& /*config*/) { return law.step(input); });
-}
-
-inline bool LawSet::foresees() const noexcept {
-  return visit(*this,
-               [](const auto& law, const auto& /*config*/) { return control::foresees(law); });
+  if (in_charge_ == LawName::kPi && !joining_) return pi_.step(input);
+  const Input copy = input;
+  return step_any(copy);
 }
 
 static_assert(Law<LawSet>);
