@@ -118,6 +118,7 @@ class IdleTare {
 
   // One window.
   [[nodiscard]] Output step(const Input& input) noexcept;
+  [[nodiscard]] Output step_inlined(const Input& input) noexcept;  // idle_tare_step.hpp
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
   void restore(const State& state) noexcept {
@@ -126,21 +127,23 @@ class IdleTare {
   }
 
  private:
+  static constexpr float kRestMemory = 8.0F;  // windows in the mean of the torque at rest
+
   explicit IdleTare(const Config& config) noexcept;
 
   void note_noise() noexcept;
   [[nodiscard]] float idle_torque(float speed_rad_s) const noexcept {
     return state_.coulomb_nm + state_.viscous_nm_s_rad * speed_rad_s;  // (E44)
   }
-  [[nodiscard]] float reach(const Input& input) const noexcept;
+  [[nodiscard]] float reach(float speed_rad_s) const noexcept;
   [[nodiscard]] float recent_mean() const noexcept;
   void rest(const Input& input) noexcept;
   void decide(const Input& input) noexcept;
-  [[nodiscard]] bool touches(const Input& input) const noexcept;
+  [[nodiscard]] bool touches(Input input) const noexcept;
   void decide_alone(const Input& input) noexcept;
   void enter_cut(float above_idle_nm) noexcept;
   void stand_still() noexcept;
-  void tare(const Input& input) noexcept;
+  void tare(Input input) noexcept;  // by value: what is inlined stays in registers
   void close_idle() noexcept;
   void regress() noexcept;
   [[nodiscard]] Output publish(const Input& input, bool taring) const noexcept;

@@ -33,7 +33,8 @@ class SpeedLines {
         length_rad_s_{table.speed_rad_s[1] - table.speed_rad_s[0],
                       table.speed_rad_s[2] - table.speed_rad_s[1]},
         value_(table.value),
-        rise_{table.value[1] - table.value[0], table.value[2] - table.value[1], 0.0F} {}
+        rise_{table.value[1] - table.value[0], table.value[2] - table.value[1], 0.0F},
+        level_(table.value[0] == table.value[1] && table.value[1] == table.value[2]) {}
 
   [[nodiscard]] constexpr Place place(float speed) const noexcept {
     const float w = magnitude(speed);
@@ -45,7 +46,9 @@ class SpeedLines {
   [[nodiscard]] constexpr float at(const Place& place) const noexcept {
     return value_[place.line] + place.share * rise_[place.line];
   }
-  [[nodiscard]] constexpr float at(float speed) const noexcept { return at(place(speed)); }
+  [[nodiscard]] constexpr float at(float speed) const noexcept {
+    return level_ ? value_[0] : at(place(speed));
+  }
 
   [[nodiscard]] constexpr bool has_places_of(const SpeedLines& other) const noexcept {
     return speed_rad_s_ == other.speed_rad_s_;
@@ -56,6 +59,7 @@ class SpeedLines {
   std::array<float, 2> length_rad_s_;
   std::array<float, 3> value_;
   std::array<float, 3> rise_;
+  bool level_;  // the same everywhere, as a loss that is not known
 };
 
 }  // namespace cutforce::estimator

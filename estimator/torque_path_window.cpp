@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/idle_tare_step.hpp"
 #include "estimator/torque_path.hpp"
 
 namespace cutforce::estimator {
@@ -73,23 +74,25 @@ struct TorquePath::Choice {
   const bool has_rotation = window.has_airgap_power && synchronous.valid;
   window.has_speed = has_sensor || has_rotation;
   window.has_sensor = has_sensor;
-  const float flux_square = std::max(synchronous.flux_square_v2s2, kSmallestFluxV2s2);
   float mean = sums_.speed_rad_s / settings_.count;
   float end = sums_.last_speed_rad_s;
   float divide = mean;
-  if (!has_sensor && has_rotation) {
-    // (E29) the other way round.
-    const float slip = settings_.rotor_resistance_ohm * window.airgap_power_w /
-                       (settings_.slip_ohm * flux_square * synchronous.synchronous_rad_s);
-    mean = synchronous.synchronous_rad_s - slip;
-    end = synchronous.synchronous_end_rad_s - slip;
-    divide = synchronous.synchronous_rad_s;
-  } else if (has_rotation && settings_.speed == Speed::kSynchronous) {
-    divide = synchronous.synchronous_rad_s;
-  } else if (has_rotation && settings_.speed == Speed::kSlip) {
-    divide =
-        synchronous_speed_from_slip(mean, window.airgap_power_w, settings_.rotor_resistance_ohm,
-                                    settings_.pole_pairs, flux_square);
+  if (has_rotation && (!has_sensor || settings_.speed != Speed::kRotor)) {
+    const float flux_square = std::max(synchronous.flux_square_v2s2, kSmallestFluxV2s2);
+    if (!has_sensor) {
+      // (E29) the other way round.
+      const float slip = settings_.rotor_resistance_ohm * window.airgap_power_w /
+                         (settings_.slip_ohm * flux_square * synchronous.synchronous_rad_s);
+      mean = synchronous.synchronous_rad_s - slip;
+      end = synchronous.synchronous_end_rad_s - slip;
+      divide = synchronous.synchronous_rad_s;
+    } else if (settings_.speed == Speed::kSynchronous) {
+      divide = synchronous.synchronous_rad_s;
+    } else {
+      divide =
+          synchronous_speed_from_slip(mean, window.airgap_power_w, settings_.rotor_resistance_ohm,
+                                      settings_.pole_pairs, flux_square);
+    }
   }
   window.direction = mean < 0.0F ? -1.0F : 1.0F;
   window.speed_rad_s = window.has_speed ? window.direction * mean : 0.0F;
@@ -106,11 +109,11 @@ struct TorquePath::Choice {
                                           .speed_rad_s = window.end_speed_rad_s,
                                           .viscous_nm_s_rad = viscous});
   const bool has_power = window.has_airgap_power || window.has_measured_power;
-  const auto tare = blocks_.tare.step({.load_torque_nm = driven.load_torque_nm,
-                                       .inertia_torque_nm = driven.inertia_torque_nm,
-                                       .speed_rad_s = window.speed_rad_s,
-                                       .feed = feed,
-                                       .valid = has_power && window.has_speed});
+  const auto tare = blocks_.tare.step_inlined({.load_torque_nm = driven.load_torque_nm,
+                                               .inertia_torque_nm = driven.inertia_torque_nm,
+                                               .speed_rad_s = window.speed_rad_s,
+                                               .feed = feed,
+                                               .valid = has_power && window.has_speed});
   if (tare.taring && window.has_airgap_power) {
     sums_.idle_current_square_a2 = window.current_square_a2;
     if (window.has_measured_power) blocks_.meter.calibrate(window.airgap_power_w);
