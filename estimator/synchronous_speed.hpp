@@ -86,7 +86,7 @@ class SynchronousSpeed {
     float electrical_rad_s;       // stator frequency, mean over the window
     float synchronous_rad_s;      // the same at the shaft, w_s
     float synchronous_end_rad_s;  // mean over the last fifth of the window: its end, for inertia
-    float flux_square_v2s2;       // |psi_R|^2, mean over the window; means nothing if not valid
+    float flux_square_v2s2;       // |psi_R|^2, mean over the window
     bool valid;
   };
 
@@ -180,7 +180,7 @@ inline auto SynchronousSpeed::close_window() noexcept -> Output {
   const float electrical = state_.angle_rad / window_s_;  // (E26)
   const bool valid = magnitude(electrical) >= config_.minimum_electrical_rad_s &&
                      state_.current_square_a2 >= least_square_a2_;
-  const float leak = config_.flux_leak_rad_s / electrical;  // no number where nothing turns
+  const float leak = valid ? config_.flux_leak_rad_s / electrical : 0.0F;
   const Output output{.electrical_rad_s = electrical,
                       .synchronous_rad_s = electrical / config_.pole_pairs,  // (E27)
                       .synchronous_end_rad_s = state_.angle_end_rad / end_pole_pairs_s_,

@@ -109,21 +109,21 @@ struct TorquePath::Choice {
                                           .speed_rad_s = window.end_speed_rad_s,
                                           .viscous_nm_s_rad = viscous});
   const bool has_power = window.has_airgap_power || window.has_measured_power;
-  const auto tare = blocks_.tare.step_inlined({.load_torque_nm = driven.load_torque_nm,
+  Load load{.tare = blocks_.tare.step_inlined({.load_torque_nm = driven.load_torque_nm,
                                                .inertia_torque_nm = driven.inertia_torque_nm,
                                                .speed_rad_s = window.speed_rad_s,
                                                .feed = feed,
-                                               .valid = has_power && window.has_speed});
-  if (tare.taring && window.has_airgap_power) {
+                                               .valid = has_power && window.has_speed}),
+            .inertia_torque_nm = driven.inertia_torque_nm,
+            .not_cutting_nm = airgap_torque_nm - driven.external_torque_nm};
+  if (load.tare.taring && window.has_airgap_power) {
     sums_.idle_current_square_a2 = window.current_square_a2;
     if (window.has_measured_power) blocks_.meter.calibrate(window.airgap_power_w);
   }
   // The tare may have changed B since the drive model used it.
-  const float changed_nm = (tare.viscous_nm_s_rad - viscous) * window.speed_rad_s;
-  return {.tare = tare,
-          .inertia_torque_nm = driven.inertia_torque_nm,
-          .not_cutting_nm =
-              airgap_torque_nm - driven.external_torque_nm + tare.coulomb_nm + changed_nm};
+  const float changed_nm = (load.tare.viscous_nm_s_rad - viscous) * window.speed_rad_s;
+  load.not_cutting_nm = load.not_cutting_nm + load.tare.coulomb_nm + changed_nm;
+  return load;
 }
 
 // P3 (1) or (4), by the speed that find_speeds chose.
