@@ -138,11 +138,12 @@ auto Supervisor::step(const Input& input) noexcept -> Output {
   const EventSet events = this->events(input);
   const S before = state_.state;
   const Reason reason = state_.reason;
-  if (const Transition* row = transition(before, events); row != nullptr) {
+  const Transition* const row = transition(before, events);
+  if (row != nullptr) [[unlikely]] {
     state_.state = row->next;
     state_.reason = row->reason;
   }
-  enter(before, (events & kForceOver) != 0);
+  if (row != nullptr || is_in(before, kLatched)) enter(before, (events & kForceOver) != 0);
   const bool moved = state_.state != before;
   const std::uint32_t wanted_pct = following(input.override_pct);
   state_.override_pct =

@@ -126,28 +126,28 @@ class Supervisor {
     // The board's own health
     bool self_test_done;
     bool self_test_passed;
-    bool checks_passed;          // configuration, lines and bus are as the machine file says
-    bool checks_done = true;     // false: it is too early to tell, and nothing has failed
-    bool output_failed;          // byte or frame could not be handed over
-    bool foreign;                // our own identifier, from another node
-    bool stop;                   // the service ends: to kDead, for good
-    std::uint32_t missed_ticks;  // since the last step
-    // The link
-    bool machine_state_new;  // an accepted frame since the last step
+    bool checks_passed;       // configuration, lines and bus are as the machine file says
+    bool checks_done = true;  // false: it is too early to tell, and nothing has failed
+    // Eight that are false where all is well: read as two words, see in_order()
+    bool output_failed;  // byte or frame could not be handed over
+    bool foreign;        // our own identifier, from another node
+    bool stop;           // the service ends: to kDead, for good
     bool bus_down;
+    bool inhibit;          // of the line, or of a frame
+    bool threading;        // as the CNC says
+    bool signals_refused;  // the health monitor will not have them
+    bool reversed;         // the spindle turns the other way than it did
     // What the CNC says; levels, of the last accepted frame
     bool arm;
     bool control;
     bool reset;
-    bool inhibit;  // of the line, or of a frame
-    bool threading;
     bool spindle_at_speed;
     bool feeding;
-    // The samples and what the loop made of them
+    // What is new since the last step
+    bool machine_state_new;  // an accepted frame
     bool sample_new;
-    bool signals_refused;       // the health monitor will not have them
-    bool reversed;              // the spindle turns the other way than it did
-    bool force_new;             // a force estimate since the last step
+    bool force_new;  // a force estimate
+    std::uint32_t missed_ticks;
     float force_n;              // of that estimate
     float force_limit_n;        // 0: there is none
     std::uint8_t override_pct;  // the controller's, as it would be sent
@@ -207,6 +207,7 @@ class Supervisor {
   [[nodiscard]] std::uint32_t steps(float time_s) const noexcept;
   // In supervisor_events.cpp: what happens in this step, EventSet of supervisor_table.hpp.
   [[nodiscard]] std::uint32_t events(const Input& input) noexcept;
+  [[nodiscard]] bool in_order(const Input& input, bool overran) const noexcept;
   void note_ages(const Input& input) noexcept;
   [[nodiscard]] bool note_missed(std::uint32_t missed_ticks) noexcept;
   void slide_window(std::uint32_t missed_ticks) noexcept;
