@@ -68,10 +68,11 @@ class AppliedOverride {
     state_.newest = (state_.newest + kHistory - 1) % kHistory;
     state_.sent_pct[state_.newest] = input.sent_pct;
 
-    const bool told = input.reported && input.reported_pct >= 0.0F && input.reported_pct <= 255.0F;
     // At rest, the report is what was sent last: then the ring need not be read.
     const auto sent_pct = static_cast<float>(input.sent_pct);
-    if (!told || within(sent_pct, sent_pct, input.reported_pct) || follows(input.reported_pct)) {
+    if (!input.reported || within(sent_pct, sent_pct, input.reported_pct) ||
+        !(input.reported_pct >= 0.0F && input.reported_pct <= 255.0F) ||
+        follows(input.reported_pct)) {
       state_.differing_ticks = 0;
     } else {
       state_.differing_ticks = std::min(state_.differing_ticks + 1, config_.confirm_ticks);

@@ -106,8 +106,7 @@ class FeedOverride {
     }
     position_pct = clamped(position_pct, before_pct - slew_down_pct_, before_pct + slew_up_pct_,
                            kSlewDownLimit, kSlewUpLimit, limits);  // (C9)
-    const bool may_rise = input.may_rise && input.ceiling_pct >= 0.0F;
-    if (!may_rise && position_pct > before_pct) {
+    if (position_pct > before_pct && !(input.may_rise && input.ceiling_pct >= 0.0F)) {
       limits |= kRiseForbidden;
       position_pct = before_pct;
     }

@@ -13,6 +13,7 @@
 #include "estimator/torque_path.hpp"
 #include "firmware/control_loop.hpp"
 #include "hal/can/messages.hpp"
+#include "hal/port.hpp"
 #include "host_tests/benchmarks/target_bodies.hpp"
 
 namespace cutforce::benchmarks {
@@ -51,8 +52,9 @@ class SynthesizedTick {
                                   .speed_rad_s = torque_.speed_rad_s,
                                   .diameter_m = diameter_m_});
   }
+  // What the loop keeps of it: the command, the limits, what the law knows.
   void control() noexcept {
-    controlled_ =
+    const auto controlled =
         controller_.step({.force_n = force_.force_n,
                           .force_sigma_n = force_.force_sigma_n,
                           .force_age_ticks = 0,
@@ -62,11 +64,17 @@ class SynthesizedTick {
                           .override_reported = true,
                           .permission = supervision_.permission,
                           .part_start = false});
+    command_.override_pct = controlled.override_pct;
+    command_.override_code = controlled.override_code;
+    command_.controlling = controlled.controlling;
+    law_ = controlled.law;
+    saturated_low_ = controlled.saturated_low;
+    saturated_high_ = controlled.saturated_high;
   }
   void supervise() noexcept {
     health_.force_new = has_force();
     health_.force_n = force_.force_n;
-    health_.override_pct = controlled_.override_pct;
+    health_.override_pct = command_.override_pct;
     supervision_ = supervisor_.step(health_);
   }
   void pack() noexcept {
@@ -76,8 +84,8 @@ class SynthesizedTick {
                                           .reason = static_cast<std::uint8_t>(supervision_.reason),
                                           .force_n = force_.force_n,
                                           .enabled = supervision_.controlling,
-                                          .saturated_low = controlled_.saturated_low,
-                                          .saturated_high = controlled_.saturated_high,
+                                          .saturated_low = saturated_low_,
+                                          .saturated_high = saturated_high_,
                                           .in_cut = torque_.in_cut,
                                           .source = static_cast<std::uint8_t>(torque_.origin),
                                           .limit = false},
@@ -136,7 +144,10 @@ class SynthesizedTick {
                                      .override_pct = 100};
   estimator::TorquePath::Output torque_{};
   estimator::CuttingForce::Output force_{};
-  control::ControlPath::Output controlled_{};
+  hal::Command command_{};
+  control::LawOutput law_{};
+  bool saturated_low_ = false;
+  bool saturated_high_ = false;
   control::Supervisor::Output supervision_{};
   hal::can::Frame frame_{};
   std::uint8_t counter_ = 0;
