@@ -64,7 +64,7 @@ class AppliedOverride {
   }
 
   // A report that is not within 0..255 % tells nothing.
-  [[nodiscard]] constexpr Output step(const Input& input) noexcept {
+  [[nodiscard]] [[gnu::always_inline]] constexpr Output step(const Input& input) noexcept {
     state_.newest = (state_.newest + kHistory - 1) % kHistory;
     state_.sent_pct[state_.newest] = input.sent_pct;
 

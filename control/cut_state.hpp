@@ -71,7 +71,7 @@ class CutState {
     return CutState{config};
   }
 
-  [[nodiscard]] constexpr Output step(const Input& input) noexcept {
+  [[nodiscard]] [[gnu::always_inline]] constexpr Output step(const Input& input) noexcept {
     if (!input.fresh) return {.phase = state_.phase, .falling = false};
     const bool on = input.force_n > config_.on_ratio * input.force_reference_n;    // (C6)
     const bool off = input.force_n < config_.off_ratio * input.force_reference_n;  // (C6)

@@ -82,13 +82,11 @@ class ForceInput {
     return ForceInput{config};
   }
 
-  [[nodiscard]] constexpr Output step(const Input& input) noexcept {
+  [[nodiscard]] [[gnu::always_inline]] constexpr Output step(const Input& input) noexcept {
     if (is_usual(input)) [[likely]]
       return take(input.force_n, input.force_sigma_n);
-    const ForceRefusal refusal = refuse(input);
-    if (refusal != ForceRefusal::kNone) return do_without(refusal);
-    return take(std::clamp(input.force_n, 0.0F, config_.highest_n),
-                std::min(input.force_sigma_n, config_.highest_n));
+    const Input copy = input;  // so that the usual one need not be in memory
+    return step_unusual(copy);
   }
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
@@ -110,7 +108,13 @@ class ForceInput {
            in_range(input.force_sigma_n);
   }
 
-  constexpr Output take(float force_n, float force_sigma_n) noexcept {
+  [[nodiscard]] constexpr Output step_unusual(const Input& input) noexcept {
+    const ForceRefusal refusal = refuse(input);
+    if (refusal != ForceRefusal::kNone) return do_without(refusal);
+    return take(std::clamp(input.force_n, 0.0F, config_.highest_n),
+                std::min(input.force_sigma_n, config_.highest_n));
+  }
+  [[gnu::always_inline]] constexpr Output take(float force_n, float force_sigma_n) noexcept {
     state_.refused_ticks = 0;
     if (state_.outcome == ForceOutcome::kLost && ++state_.good_ticks < config_.recover_ticks)
       return answer(ForceRefusal::kRecovering);
