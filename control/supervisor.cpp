@@ -1,6 +1,7 @@
 #include "control/supervisor.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "control/supervisor_table.hpp"
 
@@ -13,6 +14,23 @@ using S = SupervisorState;
   return (states & only(state)) != 0;
 }
 constexpr StateSet kLatched = from_to(S::kLinkLost, S::kDead);
+
+// By state; a hold by its cause, the monitor and the bus have their say in Supervisor::outward().
+constexpr auto kOutward = [] {
+  std::array<Supervisor::Outward, kSupervisorStateCount> all{};
+  for (unsigned k = 0; k < all.size(); ++k) {
+    const auto state = static_cast<S>(k);
+    all[k] = {.controlling = is_in(state, detail::kInControl),
+              .alive = is_in(state, detail::kOnTheLines),
+              .alarm = is_in(state, kLatched),
+              .silent = is_in(state, only(S::kBoot) | only(S::kSelfTest) | only(S::kDead)),
+              .permission = kEverything};
+    all[k].permission.enable = is_in(state, detail::kInControl);
+    all[k].permission.may_rise = is_in(state, from_to(S::kReady, S::kControl));
+  }
+  return all;
+}();
+static_assert(from_to(S::kHold, S::kDead) == (only(S::kHold) | kLatched));
 
 // By value: std::min takes addresses, and what is smaller than a register goes over the stack.
 [[nodiscard]] constexpr std::uint32_t lesser(std::uint32_t a, std::uint32_t b) noexcept {
@@ -39,8 +57,7 @@ Supervisor::Supervisor(const Config& config) noexcept
       release_steps_(steps(config.hold_release_s)),
       window_part_steps_(std::max<std::uint32_t>(steps(config.overrun_window_s) / 8, 1U)),
       missed_most_(config.overrun_ratio * static_cast<float>(steps(config.overrun_window_s))),
-      edges_allowed_(config.mode == SupervisorMode::kControl ? kArmBit | kControlBit | kResetBit
-                                                             : kArmBit | kResetBit),
+      edges_allowed_(config.mode == SupervisorMode::kControl ? kAllButtons : kArmBit | kResetBit),
       neutral_pct_(byte(config.neutral_pct)) {
   state_ = {.state = S::kBoot,
             .reason = Reason::kNone,
@@ -122,49 +139,51 @@ std::uint32_t Supervisor::steps(float time_s) const noexcept {
   return byte(state_.position_pct);
 }
 
-[[gnu::always_inline]] inline Permission Supervisor::permission() const noexcept {
-  const bool hold = state_.state == S::kHold;
-  const bool idle = is_in(state_.state, from_to(S::kReady, S::kMonitor));
-  const bool control = state_.state == S::kControl;
-  Permission permission = kEverything;
-  permission.enable = control || (hold && !controller_off());
-  permission.may_rise = control || idle;
-  if (hold || is_in(state_.state, kLatched))
-    permission.ceiling_pct = static_cast<float>(state_.override_pct);
-  return permission;
+[[gnu::always_inline]] inline auto Supervisor::outward(bool bus_down) const noexcept -> Outward {
+  const S now = state_.state;
+  Outward outward = kOutward[static_cast<unsigned>(now)];
+  if (now == S::kMonitor && state_.reason == Reason::kForceLimit) outward.alarm = true;
+  if (bus_down) outward.silent = true;
+  if (now >= S::kHold) {
+    if (now == S::kHold && controller_off()) outward.permission.enable = false;
+    outward.permission.ceiling_pct = static_cast<float>(state_.override_pct);
+  }
+  return outward;
 }
 
 auto Supervisor::step(const Input& input) noexcept -> Output {
   const EventSet events = this->events(input);
+  const Transition* const row = transition(state_.state, events);
+  if (row != nullptr || is_in(state_.state, kLatched)) [[unlikely]]
+    return step_on(row, events, input);
+  state_.override_pct = static_cast<std::uint8_t>(following(input.override_pct));
+  state_.lows = static_cast<std::uint8_t>(~buttons(input) & kAllButtons);
+  return {{outward(input.bus_down)}, state_.state, state_.reason, state_.override_pct, false};
+}
+
+// By a row of the table, or in a state whose override may fall.
+auto Supervisor::step_on(const Transition* row, EventSet events, const Input& input) noexcept
+    -> Output {
   const S before = state_.state;
   const Reason reason = state_.reason;
-  const Transition* const row = transition(before, events);
-  if (row != nullptr) [[unlikely]] {
+  if (row != nullptr) {
     state_.state = row->next;
     state_.reason = row->reason;
   }
-  if (row != nullptr || is_in(before, kLatched)) enter(before, (events & kForceOver) != 0);
+  enter(before, (events & kForceOver) != 0);
   const bool moved = state_.state != before;
   const std::uint32_t wanted_pct = following(input.override_pct);
   state_.override_pct =
       static_cast<std::uint8_t>(moved ? lesser(wanted_pct, state_.override_pct) : wanted_pct);
 
-  std::uint32_t lows = ~buttons(input) & (kArmBit | kControlBit | kResetBit);
+  std::uint32_t lows = ~buttons(input) & kAllButtons;
   if (before == S::kLinkLost && (events & kLinkOk) == 0) lows &= ~kArmBit;
   state_.lows = static_cast<std::uint8_t>(moved ? 0 : lows);
-
-  const S now = state_.state;
-  const bool starting = now == S::kBoot || now == S::kSelfTest;
-  return {
-      .state = now,
-      .reason = state_.reason,
-      .override_pct = state_.override_pct,
-      .controlling = is_in(now, detail::kInControl),
-      .alive = is_in(now, detail::kOnTheLines),
-      .alarm = is_in(now, kLatched) || (now == S::kMonitor && state_.reason == Reason::kForceLimit),
-      .silent = starting || now == S::kDead || input.bus_down,
-      .permission = permission(),
-      .changed = moved || state_.reason != reason};
+  return {{outward(input.bus_down)},
+          state_.state,
+          state_.reason,
+          state_.override_pct,
+          moved || state_.reason != reason};
 }
 
 }  // namespace cutforce::control

@@ -75,6 +75,8 @@ enum class Reason : std::uint8_t {
 };
 inline constexpr unsigned kReasonCount = 16;
 
+struct Transition;  // supervisor_table.hpp
+
 enum class SupervisorMode : std::uint8_t {
   kAdvise,   // never beyond kMonitor
   kControl,  // the CNC may give control
@@ -153,22 +155,27 @@ class Supervisor {
     std::uint8_t override_pct;  // the controller's, as it would be sent
   };
 
-  struct Output {
-    SupervisorState state;
-    Reason reason;
-    std::uint8_t override_pct;  // what goes out
-    bool controlling;           // the override is the controller's
-    bool alive;                 // whether the alive line may toggle
+  // What a state says to the world.
+  struct Outward {
+    bool controlling;  // the override is the controller's
+    bool alive;        // whether the alive line may toggle
     bool alarm;
     bool silent;            // nothing more on the bus
     Permission permission;  // for the next control tick; floor and reference are neutral here
-    bool changed;           // the state or the reason is another than before this step
+  };
+
+  struct Output : Outward {
+    SupervisorState state;
+    Reason reason;
+    std::uint8_t override_pct;  // what goes out
+    bool changed;               // the state or the reason is another than before this step
   };
 
   static constexpr std::uint32_t kNever = 1'000'000'000;  // an age; steps
   static constexpr std::uint32_t kArmBit = 1;
   static constexpr std::uint32_t kControlBit = 2;
   static constexpr std::uint32_t kResetBit = 4;
+  static constexpr std::uint32_t kAllButtons = kArmBit | kControlBit | kResetBit;
 
   struct State {
     SupervisorState state;
@@ -205,8 +212,11 @@ class Supervisor {
   explicit Supervisor(const Config& config) noexcept;
 
   [[nodiscard]] std::uint32_t steps(float time_s) const noexcept;
+  [[nodiscard]] Output step_on(const Transition* row, std::uint32_t events,
+                               const Input& input) noexcept;
   // In supervisor_events.cpp: what happens in this step, EventSet of supervisor_table.hpp.
   [[nodiscard]] std::uint32_t events(const Input& input) noexcept;
+  [[nodiscard]] std::uint32_t all_events(const Input& input, bool overran) noexcept;
   [[nodiscard]] bool in_order(const Input& input, bool overran) const noexcept;
   void note_ages(const Input& input) noexcept;
   [[nodiscard]] bool note_missed(std::uint32_t missed_ticks) noexcept;
@@ -226,7 +236,7 @@ class Supervisor {
   void enter(SupervisorState before, bool force_over) noexcept;
   [[nodiscard]] std::uint32_t following(std::uint32_t controller_pct) const noexcept;
   [[nodiscard]] bool controller_off() const noexcept;
-  [[nodiscard]] Permission permission() const noexcept;
+  [[nodiscard]] Outward outward(bool bus_down) const noexcept;
 
   Config config_;
   std::uint32_t link_steps_;

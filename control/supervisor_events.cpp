@@ -154,6 +154,10 @@ auto Supervisor::events(const Input& input) noexcept -> EventSet {
     return kLinkOk | when(state_.controlled != 0, kControlled) |
            when(state_.calm_steps >= release_steps_, kCalm);
   }
+  return all_events(input, overran);
+}
+
+auto Supervisor::all_events(const Input& input, bool overran) noexcept -> EventSet {
   const EventSet causes = holds(input, overran);
   state_.calm_steps = causes == 0 ? std::min(state_.calm_steps + 1, kNever) : 0;
   return faults(input) | tests(input) | causes | requests(input) |
