@@ -80,6 +80,9 @@ class FuzzyPi {
            centroid(strengths(sign * error_n * error_label_n_, sign * change_n * change_label_n_));
   }
 
+  // In charge after another law: as make() left it.
+  constexpr void rejoin() noexcept { state_ = State{}; }
+
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
   constexpr void restore(const State& state) noexcept { state_ = state; }
 

@@ -9,8 +9,7 @@ namespace {
 
 using estimator::exp_bounded;
 using estimator::magnitude;
-
-enum Covariance : std::size_t { kFF, kFs, kFK, kSS, kSK, kKK };
+using namespace detail;  // Covariance
 
 constexpr float kDrift_ratio_sqrt_s = 0.018F;  // of the gain, in a steady cut
 constexpr float kTrend_ratio_sqrt_s = 0.168F;  // more of it for each unit of trend
@@ -36,7 +35,6 @@ constexpr float kEachMoment = (1.0F - kNothing) / static_cast<float>(GainTracker
 constexpr std::uint32_t kMostRestarts = 4;
 constexpr float kBadFit = 9.0F;
 constexpr float kBadFitEach = 4.0F;
-constexpr std::array<float, 3> kOnset{0.05F, 0.35F, 0.7F};  // parts of a tick
 
 constexpr float square(float x) noexcept { return x * x; }
 
@@ -72,33 +70,6 @@ void keep_sound(std::array<float, 6>& covariance) noexcept {
 }
 
 }  // namespace
-
-auto GainTracker::make(const Config& config) noexcept -> std::expected<GainTracker, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return GainTracker{config};
-}
-
-GainTracker::GainTracker(const Config& config) noexcept
-    : config_(config),
-      lag_(LagStep::of(config.period_s, 0.0F, config.cut_lag_s, config.sensor_lag_s)) {
-  for (std::size_t k = 0; k < kOnset.size(); ++k) {
-    partial_[k] = LagStep::of((1.0F - kOnset[k]) * config.period_s, 0.0F, config.cut_lag_s,
-                              config.sensor_lag_s);
-  }
-  state_.memory_n = config.gain_n;
-  settle_in_air();
-}
-
-// Out of the cut: the last gain is remembered.
-void GainTracker::settle_in_air() noexcept {
-  State& s = state_;
-  s.air = 1;
-  s.gain_n = 0.0F;
-  s.covariance = {};
-  s.covariance[kSS] = square(config_.noise_n);
-  s.correlation = 0.0F;
-  s.power = 1.0F;
-}
 
 // The first reading of all: as if the force had been this for long.
 void GainTracker::begin(const Input& input) noexcept {

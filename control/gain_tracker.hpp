@@ -23,6 +23,10 @@
 
 namespace cutforce::control {
 
+namespace detail {
+enum Covariance : std::size_t { kFF, kFs, kFK, kSS, kSK, kKK };
+}
+
 class GainTracker {
  public:
   enum class ConfigError : std::uint8_t { kPeriod, kLags, kGain, kNoise, kThreshold };
@@ -117,9 +121,10 @@ class GainTracker {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static std::expected<GainTracker, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<GainTracker, ConfigError> make(
+      const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays.
-  [[nodiscard]] static GainTracker make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr GainTracker make_checked(const Config& config) noexcept {
     return GainTracker{config};
   }
 
@@ -128,17 +133,19 @@ class GainTracker {
   void coast(float feed) noexcept;
 
   // Another part: only the last gain is remembered.
-  void restart() noexcept;
+  [[gnu::cold]] void restart() noexcept;
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit GainTracker(const Config& config) noexcept;
+  static constexpr std::array<float, 3> kOnset{0.05F, 0.35F, 0.7F};  // parts of a tick
+
+  explicit constexpr GainTracker(const Config& config) noexcept;
 
   void predict(float feed, float feed_sigma, float drift) noexcept;
   void correct(float innovation_n, float variance_n2) noexcept;
-  void begin_jump(const Input& input, float noise_n2) noexcept;
+  [[gnu::cold]] void begin_jump(const Input& input, float noise_n2) noexcept;
   void follow(float feed, float feed_sigma, float reading_n, float noise_n2,
               std::uint32_t tick) noexcept;
   struct Fit {
@@ -147,20 +154,48 @@ class GainTracker {
     float misfit;     // sum of r^2 / R, with the prior's share
   };
   using Fits = std::array<Fit, kMoments>;
-  [[nodiscard]] Fits fit_moments() noexcept;
-  void conclude(const Fits& fits) noexcept;
-  [[nodiscard]] bool follow_on(const Input& input, float noise_n2) noexcept;
+  [[nodiscard]] [[gnu::cold]] Fits fit_moments() noexcept;
+  [[gnu::cold]] void conclude(const Fits& fits) noexcept;
+  [[nodiscard]] [[gnu::cold]] bool follow_on(const Input& input, float noise_n2) noexcept;
   [[nodiscard]] bool surprises(const Input& input, float innovation,
                                float innovation_n) const noexcept;
   void note_calm(float innovation, float trend) noexcept;
-  void begin(const Input& input) noexcept;
-  void settle_in_air() noexcept;
+  [[gnu::cold]] void begin(const Input& input) noexcept;
+  [[gnu::cold]] constexpr void settle_in_air() noexcept;
 
   Config config_;
   LagStep lag_;
   std::array<LagStep, 3> partial_;  // from a moment of a jump to the end of its tick
   State state_{};
 };
+
+constexpr auto GainTracker::make(const Config& config) noexcept
+    -> std::expected<GainTracker, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return GainTracker{config};
+}
+
+constexpr GainTracker::GainTracker(const Config& config) noexcept
+    : config_(config),
+      lag_(LagStep::of(config.period_s, 0.0F, config.cut_lag_s, config.sensor_lag_s)) {
+  for (std::size_t k = 0; k < kOnset.size(); ++k) {
+    partial_[k] = LagStep::of((1.0F - kOnset[k]) * config.period_s, 0.0F, config.cut_lag_s,
+                              config.sensor_lag_s);
+  }
+  state_.memory_n = config.gain_n;
+  settle_in_air();
+}
+
+// Out of the cut: the last gain is remembered.
+constexpr void GainTracker::settle_in_air() noexcept {
+  State& s = state_;
+  s.air = 1;
+  s.gain_n = 0.0F;
+  s.covariance = {};
+  s.covariance[detail::kSS] = config_.noise_n * config_.noise_n;
+  s.correlation = 0.0F;
+  s.power = 1.0F;
+}
 
 static_assert(std::is_trivially_copyable_v<GainTracker>);
 

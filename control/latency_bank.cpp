@@ -18,18 +18,6 @@ constexpr float relative_change(float now, float before) noexcept {
 
 }  // namespace
 
-auto LatencyBank::make(const Config& config) noexcept -> std::expected<LatencyBank, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return LatencyBank{config};
-}
-
-LatencyBank::LatencyBank(const Config& config) noexcept
-    : config_(config),
-      tick_(
-          LagStep::of(config.period_s, config.feed_lag_s, config.cut_lag_s, config.sensor_lag_s)) {
-  state_.latency_s = config.latency_s;
-}
-
 float LatencyBank::candidate_s(std::size_t k) const noexcept {
   if (k == 0) return state_.latency_s;
   return config_.most_latency_s * static_cast<float>(k - 1) / static_cast<float>(kCandidates - 2);

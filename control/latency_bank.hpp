@@ -71,9 +71,10 @@ class LatencyBank {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static std::expected<LatencyBank, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<LatencyBank, ConfigError> make(
+      const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays.
-  [[nodiscard]] static LatencyBank make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr LatencyBank make_checked(const Config& config) noexcept {
     return LatencyBank{config};
   }
   [[nodiscard]] Output step(const Input& input) noexcept;
@@ -82,7 +83,7 @@ class LatencyBank {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit LatencyBank(const Config& config) noexcept;
+  explicit constexpr LatencyBank(const Config& config) noexcept;
   [[nodiscard]] float candidate_s(std::size_t k) const noexcept;
   [[nodiscard]] float advance(Chain& chain, float latency_s,
                               std::span<const float> sent) const noexcept;
@@ -92,6 +93,19 @@ class LatencyBank {
   LagStep tick_;
   State state_{};
 };
+
+constexpr auto LatencyBank::make(const Config& config) noexcept
+    -> std::expected<LatencyBank, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return LatencyBank{config};
+}
+
+constexpr LatencyBank::LatencyBank(const Config& config) noexcept
+    : config_(config),
+      tick_(
+          LagStep::of(config.period_s, config.feed_lag_s, config.cut_lag_s, config.sensor_lag_s)) {
+  state_.latency_s = config.latency_s;
+}
 
 static_assert(std::is_trivially_copyable_v<LatencyBank>);
 

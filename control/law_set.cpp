@@ -4,96 +4,82 @@
 
 namespace cutforce::control {
 
-// The visitor sees the law in charge and that law's config.
+auto LawSet::make(const Config& config) noexcept -> std::expected<LawSet, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return LawSet{config};
+}
+
+// The visitor sees the law in charge.
 template <class Set, class Visitor>
 auto LawSet::visit(Set& set, const Visitor& visitor) {
   switch (set.in_charge_) {
     case LawName::kPi:
       break;
     case LawName::kPid:
-      return visitor(set.pid_, set.config_.pid);
+      return visitor(set.pid_);
     case LawName::kPoleAssignment:
-      return visitor(set.pole_assignment_, set.config_.pole_assignment);
+      return visitor(set.pole_assignment_);
     case LawName::kMrac:
-      return visitor(set.mrac_, set.config_.mrac);
+      return visitor(set.mrac_);
     case LawName::kVariableGain:
-      return visitor(set.variable_gain_, set.config_.variable_gain);
+      return visitor(set.variable_gain_);
     case LawName::kFuzzy:
-      return visitor(set.fuzzy_, set.config_.fuzzy);
+      return visitor(set.fuzzy_);
     case LawName::kPredictive:
-      return visitor(set.predictive_, set.config_.predictive);
+      return visitor(set.predictive_);
   }
-  return visitor(set.pi_, set.config_.pi);
+  return visitor(set.pi_);
 }
 
 namespace {
 
-// Apart, so that the copy is not on the stack below a step of the deepest law.
+// A function for each law: what one of them keeps on the stack is not below another.
 template <class L>
-[[gnu::noinline]] void start_anew(L& law, const typename L::Config& config) noexcept {
-  law = *L::make(config);
-}
-
-// Once for each law, whoever calls it.
-template <class L>
-[[gnu::noinline]] LawOutput step_of(L& law, const LawInput& input) noexcept {
+[[gnu::noinline]] LawOutput step_apart(L& law, const LawInput& input) noexcept {
   return law.step(input);
 }
 
 }  // namespace
 
-auto LawSet::Config::check() const noexcept -> std::expected<void, ConfigError> {
-  const auto fail = [](ConfigError error) { return std::unexpected{error}; };
-  if (static_cast<std::size_t>(in_charge) >= kLawCount) return fail(ConfigError::kInCharge);
-  if (!pi.check()) return fail(ConfigError::kPi);
-  if (!pid.check()) return fail(ConfigError::kPid);
-  if (!pole_assignment.check()) return fail(ConfigError::kPoleAssignment);
-  if (!mrac.check()) return fail(ConfigError::kMrac);
-  if (!variable_gain.check()) return fail(ConfigError::kVariableGain);
-  if (!fuzzy.check()) return fail(ConfigError::kFuzzy);
-  if (!predictive.check()) return fail(ConfigError::kPredictive);
-  for (const float other_s : {pi.period_s, pid.period_s, pole_assignment.period_s, mrac.period_s,
-                              variable_gain.period_s, fuzzy.period_s, predictive.period_s}) {
-    if (!(other_s >= period_s && other_s <= period_s)) return fail(ConfigError::kPeriods);
-  }
-  return {};
-}
-
-LawSet::LawSet(const Config& config) noexcept
-    : in_charge_(config.in_charge),
-      pi_(*PiController::make(config.pi)),
-      pid_(*Pid::make(config.pid)),
-      pole_assignment_(*PoleAssignment::make(config.pole_assignment)),
-      mrac_(*Mrac::make(config.mrac)),
-      variable_gain_(*VariableGain::make(config.variable_gain)),
-      fuzzy_(*FuzzyPi::make(config.fuzzy)),
-      predictive_(Predictive::make_checked(config.predictive)),
-      config_(config) {}
-
-auto LawSet::make(const Config& config) noexcept -> std::expected<LawSet, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return LawSet{config};
-}
-
 auto LawSet::step_any(const Input& input) noexcept -> Output {
   if (joining_ && input.mode == LawMode::kHold) return law_answer(input.override_applied_pct);
   if (joining_) join(input);
-  return visit(*this, [&](auto& law, const auto& /*config*/) { return step_of(law, input); });
+  return step_in_charge(input);
 }
 
-void LawSet::join(const Input& input) noexcept {
+// Joining steps too, and each law's step is to be in the image once. Not by visit(): what it
+// answers with would be copied.
+[[gnu::noinline]] auto LawSet::step_in_charge(const Input& input) noexcept -> Output {
+  switch (in_charge_) {
+    case LawName::kPi:
+      break;
+    case LawName::kPid:
+      return step_apart(pid_, input);
+    case LawName::kPoleAssignment:
+      return step_apart(pole_assignment_, input);
+    case LawName::kMrac:
+      return step_apart(mrac_, input);
+    case LawName::kVariableGain:
+      return step_apart(variable_gain_, input);
+    case LawName::kFuzzy:
+      return step_apart(fuzzy_, input);
+    case LawName::kPredictive:
+      return step_apart(predictive_, input);
+  }
+  return step_apart(pi_, input);
+}
+
+[[gnu::cold, gnu::noinline]] void LawSet::rejoin_in_charge() noexcept {
+  visit(*this, [](auto& law) { law.rejoin(); });
+}
+
+[[gnu::cold, gnu::noinline]] void LawSet::join(const Input& input) noexcept {
   joining_ = false;
   Input still = input;
   still.mode = LawMode::kTrack;
   still.part_start = false;
-  visit(*this, [&still](auto& law, const auto& config) {
-    if constexpr (requires { law.rejoin(); }) {
-      law.rejoin();
-    } else {
-      start_anew(law, config);
-    }
-    for (int k = 0; k < kCatchUpTicks; ++k) std::ignore = step_of(law, still);
-  });
+  rejoin_in_charge();
+  for (int k = 0; k < kCatchUpTicks; ++k) std::ignore = step_in_charge(still);
 }
 
 void LawSet::select(LawName name) noexcept {
@@ -103,8 +89,7 @@ void LawSet::select(LawName name) noexcept {
 }
 
 bool LawSet::foresees() const noexcept {
-  return visit(*this,
-               [](const auto& law, const auto& /*config*/) { return control::foresees(law); });
+  return visit(*this, [](const auto& law) { return control::foresees(law); });
 }
 
 auto LawSet::state() const noexcept -> State {

@@ -2,14 +2,14 @@
 //
 // Only the law in charge runs, so the others cost memory and no time. A law that is put in charge
 // joins at the first tick with a fresh force; until then the override stays where the path leaves
-// it. Joining, it starts as make() left it, is shown the tick `kCatchUpTicks` times in kTrack, as
+// it. Joining, it starts anew, is shown the tick `kCatchUpTicks` times in kTrack, as
 // if the cut had stood like this, and then takes part in the tick as the path wants. What
 // differences and filters remember has then become the present, and what learns the process has
 // seen it. So the override moves by the new law's own step from a cut at rest, and by nothing else
 // (law.hpp: following is bumpless).
 //
-// A law that keeps what it learned while another was in charge, a map of the part for one, has
-// `void rejoin() noexcept`: it is called instead of starting anew.
+// A law of the set says with `void rejoin() noexcept` what starting anew is: to be as make() left
+// it, or to keep what it learned while another was in charge, a map of the part for one.
 #pragma once
 
 #include <cstddef>
@@ -67,7 +67,7 @@ class LawSet {
     FuzzyPi::Config fuzzy;
     Predictive::Config predictive;
 
-    [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
   };
 
   using Input = LawInput;
@@ -88,7 +88,9 @@ class LawSet {
   // Fails iff check() does.
   [[nodiscard]] static std::expected<LawSet, ConfigError> make(const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays.
-  [[nodiscard]] static LawSet make_checked(const Config& config) noexcept { return LawSet{config}; }
+  [[nodiscard]] static constexpr LawSet make_checked(const Config& config) noexcept {
+    return LawSet{config};
+  }
 
   [[nodiscard]] [[gnu::always_inline]] Output step(const Input& input) noexcept;
 
@@ -102,10 +104,12 @@ class LawSet {
 
  private:
   // config has passed check(): every law can be made.
-  explicit LawSet(const Config& config) noexcept;
+  explicit constexpr LawSet(const Config& config) noexcept;
 
   [[nodiscard]] Output step_any(const Input& input) noexcept;
   void join(const Input& input) noexcept;
+  void rejoin_in_charge() noexcept;
+  [[nodiscard]] Output step_in_charge(const Input& input) noexcept;
   template <class Set, class Visitor>
   static auto visit(Set& set, const Visitor& visitor);
 
@@ -119,7 +123,6 @@ class LawSet {
   VariableGain variable_gain_;
   FuzzyPi fuzzy_;
   Predictive predictive_;
-  Config config_;
 };
 
 // PI is a few lines, and inlined: its input is never put together in memory.
@@ -129,11 +132,38 @@ inline auto LawSet::step(const Input& input) noexcept -> Output {
   return step_any(copy);
 }
 
+constexpr auto LawSet::Config::check() const noexcept -> std::expected<void, ConfigError> {
+  const auto fail = [](ConfigError error) { return std::unexpected{error}; };
+  if (static_cast<std::size_t>(in_charge) >= kLawCount) return fail(ConfigError::kInCharge);
+  if (!pi.check()) return fail(ConfigError::kPi);
+  if (!pid.check()) return fail(ConfigError::kPid);
+  if (!pole_assignment.check()) return fail(ConfigError::kPoleAssignment);
+  if (!mrac.check()) return fail(ConfigError::kMrac);
+  if (!variable_gain.check()) return fail(ConfigError::kVariableGain);
+  if (!fuzzy.check()) return fail(ConfigError::kFuzzy);
+  if (!predictive.check()) return fail(ConfigError::kPredictive);
+  for (const float other_s : {pi.period_s, pid.period_s, pole_assignment.period_s, mrac.period_s,
+                              variable_gain.period_s, fuzzy.period_s, predictive.period_s}) {
+    if (!(other_s >= period_s && other_s <= period_s)) return fail(ConfigError::kPeriods);
+  }
+  return {};
+}
+
 static_assert(Law<LawSet>);
 static_assert(std::is_standard_layout_v<LawSet::State>);
 static_assert(sizeof(LawSet::State) == sizeof(PiController::State) + sizeof(Pid::State) +
                                            sizeof(PoleAssignment::State) + sizeof(Mrac::State) +
                                            sizeof(VariableGain::State) + sizeof(FuzzyPi::State) +
                                            sizeof(Predictive::State) + 2 * 4);
+
+constexpr LawSet::LawSet(const Config& config) noexcept
+    : in_charge_(config.in_charge),
+      pi_(*PiController::make(config.pi)),
+      pid_(*Pid::make(config.pid)),
+      pole_assignment_(*PoleAssignment::make(config.pole_assignment)),
+      mrac_(*Mrac::make(config.mrac)),
+      variable_gain_(*VariableGain::make(config.variable_gain)),
+      fuzzy_(*FuzzyPi::make(config.fuzzy)),
+      predictive_(Predictive::make_checked(config.predictive)) {}
 
 }  // namespace cutforce::control

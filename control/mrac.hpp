@@ -95,6 +95,9 @@ class Mrac {
     return answer;
   }
 
+  // In charge after another law: as make() left it.
+  constexpr void rejoin() noexcept { restore(State{}); }
+
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
   constexpr void restore(const State& state) noexcept {
     state_ = state;

@@ -9,25 +9,22 @@ namespace {
 
 using estimator::power_positive;
 
-constexpr float kScale = 1024.0F;       // of e
-constexpr std::uint16_t kFree = 65535;  // air, or so light a cut that nothing limits
-constexpr float kMargin_s = 0.04F;      // path: a part lies this much off, perhaps
-constexpr float kBehind_s = 0.02F;      // path: a cell holds this long after it was passed
-constexpr float kServo_ratio = 1.5F;    // braking takes this many lags of the servo
+constexpr float kScale = 1024.0F;     // of e
+constexpr float kMargin_s = 0.04F;    // path: a part lies this much off, perhaps
+constexpr float kBehind_s = 0.02F;    // path: a cell holds this long after it was passed
+constexpr float kServo_ratio = 1.5F;  // braking takes this many lags of the servo
 // Cells closer to each other than by 1.15 are averaged: 23/20.
 constexpr std::uint32_t kFlatUnder = 23;
 constexpr std::uint32_t kFlatOver = 20;
-constexpr float kWearLeast = 0.7F;
-constexpr float kWearMost = 1.5F;
 constexpr float kWearMemory_s = 1.0F;
-constexpr float kFar_ratio = 1.3F;     // a gain this far off the map's tells nothing of wear
 constexpr float kDoubt_ratio = 0.75F;  // of the reference
 constexpr float kDoubt_s = 0.7F;
 constexpr float kDoubtWay_s = 0.3F;  // path: the cell may begin this much early
 constexpr float kDoubtInAir_s = 1.75F;
 
 constexpr std::uint16_t cell_of(float e) noexcept {
-  return e > 0.0F ? static_cast<std::uint16_t>(std::clamp(kScale * e, 1.0F, 65534.0F)) : kFree;
+  return e > 0.0F ? static_cast<std::uint16_t>(std::clamp(kScale * e, 1.0F, 65534.0F))
+                  : PathMap::kFree;
 }
 
 constexpr std::size_t index_of(float position_s) noexcept {
@@ -37,15 +34,6 @@ constexpr std::size_t index_of(float position_s) noexcept {
 }
 
 }  // namespace
-
-PathMap::PathMap(const Config& config) noexcept
-    : config_(config),
-      inverse_exponent_(1.0F / config.feed_exponent),
-      wear_far_ratio_(power_positive(kFar_ratio, inverse_exponent_)),
-      wear_least_ratio_(power_positive(kWearMost, -inverse_exponent_)),
-      wear_most_ratio_(power_positive(kWearLeast, -inverse_exponent_)) {
-  state_.last_cell = kFree;
-}
 
 // e of a gain; 0 where nothing limits. (C93)
 float PathMap::feed_at_reference(float gain_n) const noexcept {

@@ -21,12 +21,16 @@
 #include <expected>
 #include <type_traits>
 
+#include "estimator/polynomials.hpp"
+
 namespace cutforce::control {
 
 class PathMap {
  public:
   static constexpr std::size_t kCells = 2048;
   static constexpr float kCell_s = 0.02F;  // at 100 %
+
+  static constexpr std::uint16_t kFree = 65535;  // air, or so light a cut that nothing limits
 
   enum class ConfigError : std::uint8_t { kPeriod, kLags, kExponent, kGain };
 
@@ -87,17 +91,18 @@ class PathMap {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static std::expected<PathMap, ConfigError> make(const Config& config) noexcept {
+  [[nodiscard]] static constexpr std::expected<PathMap, ConfigError> make(
+      const Config& config) noexcept {
     if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
     return PathMap{config};
   }
   // Of a config that check() accepts, made where it stays.
-  [[nodiscard]] static PathMap make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr PathMap make_checked(const Config& config) noexcept {
     return PathMap{config};
   }
 
   // A part begins: what the last one taught is kept.
-  void start() noexcept;
+  [[gnu::cold]] void start() noexcept;
   // Nobody knows where the tool is: nothing is learned or limited until the next part begins.
   void lose_place() noexcept {
     state_.written = 0;
@@ -116,11 +121,15 @@ class PathMap {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit PathMap(const Config& config) noexcept;
+  static constexpr float kWearLeast = 0.7F;
+  static constexpr float kWearMost = 1.5F;
+  static constexpr float kFar_ratio = 1.3F;  // a gain this far off the map's tells nothing of wear
+
+  explicit constexpr PathMap(const Config& config) noexcept;
 
   [[nodiscard]] float feed_at_reference(float gain_n) const noexcept;
   void write_to(float position_s, std::uint16_t cell) noexcept;
-  void believe(std::uint32_t cell, std::uint32_t count) noexcept;
+  [[gnu::cold]] void believe(std::uint32_t cell, std::uint32_t count) noexcept;
   void merge(std::uint32_t cell, std::uint32_t sum, std::uint32_t count) noexcept;
   void follow_wear(float feed_now, float feed_then) noexcept;
   [[nodiscard]] float slowest(const Question& question, float scale_pct) const noexcept;
@@ -135,6 +144,15 @@ class PathMap {
   float reference_feed_ = 0.0F;
   State state_{};
 };
+
+constexpr PathMap::PathMap(const Config& config) noexcept
+    : config_(config),
+      inverse_exponent_(1.0F / config.feed_exponent),
+      wear_far_ratio_(estimator::power_positive(kFar_ratio, inverse_exponent_)),
+      wear_least_ratio_(estimator::power_positive(kWearMost, -inverse_exponent_)),
+      wear_most_ratio_(estimator::power_positive(kWearLeast, -inverse_exponent_)) {
+  state_.last_cell = kFree;
+}
 
 static_assert(std::is_trivially_copyable_v<PathMap>);
 

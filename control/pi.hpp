@@ -83,6 +83,9 @@ class PiController {
     return law_answer(velocity_form_pct(state_, input, gains_));
   }
 
+  // In charge after another law: as make() left it.
+  constexpr void rejoin() noexcept { state_ = State{}; }
+
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
   constexpr void restore(const State& state) noexcept { state_ = state; }
 

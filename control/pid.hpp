@@ -90,6 +90,9 @@ class Pid {
     return law_answer(state_.wanted_pct);
   }
 
+  // In charge after another law: as make() left it.
+  constexpr void rejoin() noexcept { state_ = State{}; }
+
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
   constexpr void restore(const State& state) noexcept { state_ = state; }
 

@@ -110,6 +110,9 @@ class PoleAssignment {
     return state_.settled_n_pct > 0.0F ? state_.estimate.gain_n_pct / state_.settled_n_pct : 1.0F;
   }
 
+  // In charge after another law: as make() left it.
+  constexpr void rejoin() noexcept { state_ = {.estimate = process_gain_.initial()}; }
+
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
   constexpr void restore(const State& state) noexcept { state_ = state; }
 
@@ -119,7 +122,7 @@ class PoleAssignment {
       : config_(config),
         process_gain_(*ProcessGain::make(config.estimate)),
         settle_ticks_(static_cast<std::uint32_t>(config.settle_s / config.period_s + 0.5F)) {
-    state_.estimate = process_gain_.initial();
+    rejoin();
   }
 
   constexpr void settle(CutPhase phase, bool learned) noexcept {

@@ -10,116 +10,23 @@ using estimator::exp_bounded;
 using estimator::power_positive;
 
 constexpr float kAfterJump_s = 0.35F;
-constexpr float kAfterJump_1_s = 4.835F;  // faster recovery while a jump is being learned
-constexpr float kMiddle_s = 0.2F;
 constexpr float kEntry_ratio = 0.05F;   // of the reference: a reading above it ends the air
 constexpr float kTelling_ratio = 0.2F;  // of the reference: force that tells of the dead time
-constexpr float kLongestLatency_s = 0.4F;
-constexpr float kMostTicks = static_cast<float>(Predictive::kHistory - 2);
-constexpr float kTurns_s = 0.6F;  // jumps up and down within this time are in turn
+constexpr float kTurns_s = 0.6F;        // jumps up and down within this time are in turn
 constexpr float kDoubtGrowth = 1.6F;
 constexpr float kDoubtMost = 16.0F;
 constexpr float kDoubtMemory_s = 20.0F;
 constexpr float kLost_s = 0.5F;  // after which a cut that is left is a light one
 constexpr float kOdd = -1.0F;    // a reading this low (standard deviations) is waited out
 
-LagStep lag_step(const Predictive::Config& config, float length_s) noexcept {
-  return LagStep::of(length_s, config.feed_lag_s, config.process_lag_s, config.sensor_lag_s);
-}
-
-constexpr GainTracker::Config tracker_config(const Predictive::Config& config) noexcept {
-  return {.period_s = config.period_s,
-          .cut_lag_s = config.process_lag_s,
-          .sensor_lag_s = config.sensor_lag_s,
-          .gain_n = config.process_gain_n,
-          .noise_ratio = config.noise_ratio,
-          .noise_n = config.noise_n,
-          .jump_threshold = config.jump_threshold};
-}
-
-constexpr PathMap::Config map_config(const Predictive::Config& config) noexcept {
-  return {.period_s = config.period_s,
-          .feed_lag_s = config.feed_lag_s,
-          .sensor_lag_s = config.sensor_lag_s,
-          .feed_exponent = config.feed_exponent,
-          .gain_n = config.process_gain_n};
-}
-
-constexpr LatencyBank::Config bank_config(const Predictive::Config& config) noexcept {
-  return {.period_s = config.period_s,
-          .latency_s = config.latency_s,
-          .most_latency_s = std::min(kLongestLatency_s, kMostTicks * config.period_s),
-          .feed_lag_s = config.feed_lag_s,
-          .cut_lag_s = config.process_lag_s,
-          .sensor_lag_s = config.sensor_lag_s};
-}
-
 }  // namespace
-
-std::expected<void, Predictive::ConfigError> Predictive::Config::check() const noexcept {
-  const auto fail = [](ConfigError error) { return std::unexpected{error}; };
-  if (!(period_s > 0.0F && period_s <= 10.0F)) return fail(ConfigError::kPeriod);
-  if (!(latency_s >= 0.0F && latency_s <= static_cast<float>(kHistory - 2) * period_s))
-    return fail(ConfigError::kLatency);
-  if (!(latency_sigma_s >= 0.0F && latency_sigma_s <= 1.0F)) return fail(ConfigError::kLatency);
-  if (!(feed_lag_s >= 0.0F && feed_lag_s <= 10.0F && process_lag_s > 0.0F &&
-        process_lag_s <= 10.0F && sensor_lag_s >= 0.0F && sensor_lag_s <= 10.0F &&
-        apart(process_lag_s, feed_lag_s) && apart(process_lag_s, sensor_lag_s)))
-    return fail(ConfigError::kLags);
-  if (!(feed_exponent >= 0.3F && feed_exponent <= 1.5F)) return fail(ConfigError::kExponent);
-  if (!(process_gain_n > 0.0F && process_gain_n <= 1e7F)) return fail(ConfigError::kGain);
-  if (!(noise_ratio >= 0.0F && noise_ratio < 1.0F && noise_n > 0.0F && noise_n <= 1e6F))
-    return fail(ConfigError::kNoise);
-  if (!(jump_threshold >= 2.0F && jump_threshold <= 20.0F)) return fail(ConfigError::kThreshold);
-  if (!(calm_horizon_s >= 2.0F * period_s && calm_horizon_s <= 100.0F))
-    return fail(ConfigError::kHorizon);
-  if (!(recovery_1_s > 0.0F && recovery_1_s <= 100.0F)) return fail(ConfigError::kRecovery);
-  if (!(caution_ratio >= 0.0F && caution_ratio <= 3.0F)) return fail(ConfigError::kCaution);
-  if (!(floor_pct >= 0.0F && floor_pct < ceiling_pct && ceiling_pct <= 254.0F) ||
-      (step_pct != 1 && step_pct != 10))
-    return fail(ConfigError::kRange);
-  return {};
-}
 
 auto Predictive::make(const Config& config) noexcept -> std::expected<Predictive, ConfigError> {
   if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  if (!tracker_config(config).check() || !map_config(config).check())
+  if (!detail::tracker_config(config).check() || !detail::map_config(config).check())
     return std::unexpected{ConfigError::kGain};
-  if (!bank_config(config).check()) return std::unexpected{ConfigError::kLatency};
+  if (!detail::bank_config(config).check()) return std::unexpected{ConfigError::kLatency};
   return Predictive{config};
-}
-
-Predictive::Predictive(const Config& config) noexcept
-    : config_(config),
-      tracker_(GainTracker::make_checked(tracker_config(config))),
-      map_(PathMap::make_checked(map_config(config))),
-      bank_(LatencyBank::make_checked(bank_config(config))),
-      tick_(lag_step(config, config.period_s)),
-      inverse_exponent_(1.0F / config.feed_exponent),
-      forgets_ratio_(exp_bounded(-config.recovery_1_s * config.period_s)),
-      forgets_after_jump_ratio_(exp_bounded(-kAfterJump_1_s * config.period_s)) {
-  assume_latency(config.latency_s);
-  const std::array<float, kReaches> lengths{config.period_s, 2.0F * config.period_s,
-                                            std::max(kMiddle_s, 2.0F * config.period_s),
-                                            config.calm_horizon_s};
-  for (std::size_t k = 0; k < kReaches; ++k) {
-    const LagStep h = lag_step(config, lengths[k]);
-    const float apart_s = config.feed_lag_s - config.process_lag_s;
-    horizons_[k] = {.length_s = lengths[k],
-                    .force = h.cut,
-                    .feed = (h.feed - h.cut) * config.feed_lag_s / apart_s};
-  }
-  own_.sent.fill(1.0F);
-  own_.feed.v = 1.0F;
-}
-
-void Predictive::assume_latency(float latency_s) noexcept {  // (C71)
-  whole_ticks_ = static_cast<std::uint32_t>(latency_s / config_.period_s + 1e-4F);
-  const float early_s =
-      std::max(latency_s - static_cast<float>(whole_ticks_) * config_.period_s, 0.0F);
-  dead_decay_ = exp_bounded(-latency_s / config_.process_lag_s);
-  early_ = lag_step(config_, early_s);
-  late_ = lag_step(config_, config_.period_s - early_s);
 }
 
 void Predictive::find_latency(const Input& input, bool jumped) noexcept {

@@ -64,7 +64,7 @@ class Predictive {
     bool learns;             // from one part to the next; needs the start of each
     bool finds_latency;      // while cutting: a commissioning step
 
-    [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
   };
 
   using Input = LawInput;
@@ -100,20 +100,20 @@ class Predictive {
   // Fails iff check() does.
   [[nodiscard]] static std::expected<Predictive, ConfigError> make(const Config& config) noexcept;
   // Of a config that make() accepts, made where it stays: 5 kB do not pass over a stack.
-  [[nodiscard]] static Predictive make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr Predictive make_checked(const Config& config) noexcept {
     return Predictive{config};
   }
 
   [[nodiscard]] Output step(const Input& input) noexcept;
   // In charge again after another law: what was learned of parts and of the dead time stays, but
   // nothing of this part, whose path nobody followed.
-  void rejoin() noexcept;
+  [[gnu::cold]] void rejoin() noexcept;
 
   [[nodiscard]] State state() const noexcept;
   void restore(const State& state) noexcept;
 
  private:
-  explicit Predictive(const Config& config) noexcept;
+  explicit constexpr Predictive(const Config& config) noexcept;
 
   struct Forecast {
     float force_n;  // at the end of the dead time
@@ -141,7 +141,7 @@ class Predictive {
   [[nodiscard]] float wanted_pct(const Forecast& ahead, const Horizon& horizon,
                                  float reference_n) const noexcept;
   void doubt_timing(const GainTracker::Output& seen) noexcept;
-  void assume_latency(float latency_s) noexcept;
+  [[gnu::cold]] constexpr void assume_latency(float latency_s) noexcept;
   void find_latency(const Input& input, bool jumped) noexcept;
   [[nodiscard]] float feed_ratio(float w) noexcept;
   [[nodiscard]] const float* sent() const noexcept { return &own_.sent[own_.newest]; }
@@ -170,3 +170,5 @@ class Predictive {
 };
 
 }  // namespace cutforce::control
+
+#include "control/predictive_make.hpp"  // IWYU pragma: export

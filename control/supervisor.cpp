@@ -44,45 +44,6 @@ static_assert(from_to(S::kHold, S::kDead) == (only(S::kHold) | kLatched));
 
 }  // namespace
 
-auto Supervisor::make(const Config& config) noexcept -> std::expected<Supervisor, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return Supervisor{config};
-}
-
-Supervisor::Supervisor(const Config& config) noexcept
-    : config_(config),
-      link_steps_(config.link_required ? steps(config.link_timeout_s) : kNever),
-      samples_steps_(steps(config.samples_timeout_s)),
-      estimate_steps_(steps(config.estimate_timeout_s)),
-      release_steps_(steps(config.hold_release_s)),
-      window_part_steps_(std::max<std::uint32_t>(steps(config.overrun_window_s) / 8, 1U)),
-      missed_most_(config.overrun_ratio * static_cast<float>(steps(config.overrun_window_s))),
-      edges_allowed_(config.mode == SupervisorMode::kControl ? kAllButtons : kArmBit | kResetBit),
-      neutral_pct_(byte(config.neutral_pct)) {
-  state_ = {.state = S::kBoot,
-            .reason = Reason::kNone,
-            .override_pct = byte(config.neutral_pct),
-            .lows = 0,
-            .controlled = 0,
-            .forces_over = 0,
-            .force_n = 0.0F,
-            .position_pct = config.neutral_pct,
-            .fall_to_pct = config.neutral_pct,
-            .link_age = kNever,
-            .sample_age = kNever,
-            .force_age = kNever,
-            .estimate_age = 0,
-            .calm_steps = 0,
-            .missed_run = 0,
-            .window_steps = 0,
-            .window_part = 0,
-            .missed = {}};
-}
-
-std::uint32_t Supervisor::steps(float time_s) const noexcept {
-  return std::max<std::uint32_t>(static_cast<std::uint32_t>(time_s / config_.period_s + 0.5F), 1U);
-}
-
 // The fall of a latched state, from its beginning.
 [[gnu::always_inline]] inline void Supervisor::enter(SupervisorState before,
                                                      bool force_over) noexcept {

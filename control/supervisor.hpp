@@ -199,7 +199,8 @@ class Supervisor {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static std::expected<Supervisor, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<Supervisor, ConfigError> make(
+      const Config& config) noexcept;
   [[nodiscard]] Output step(const Input& input) noexcept;
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
@@ -209,9 +210,9 @@ class Supervisor {
   }
 
  private:
-  explicit Supervisor(const Config& config) noexcept;
+  explicit constexpr Supervisor(const Config& config) noexcept;
 
-  [[nodiscard]] std::uint32_t steps(float time_s) const noexcept;
+  [[nodiscard]] constexpr std::uint32_t steps(float time_s) const noexcept;
   [[nodiscard]] Output step_on(const Transition* row, std::uint32_t events,
                                const Input& input) noexcept;
   // In supervisor_events.cpp: what happens in this step, EventSet of supervisor_table.hpp.
@@ -250,6 +251,46 @@ class Supervisor {
   bool missed_too_many_ = false;  // in the window: the sum of State::missed against missed_most_
   State state_{};
 };
+
+constexpr auto Supervisor::make(const Config& config) noexcept
+    -> std::expected<Supervisor, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return Supervisor{config};
+}
+
+constexpr Supervisor::Supervisor(const Config& config) noexcept
+    : config_(config),
+      link_steps_(config.link_required ? steps(config.link_timeout_s) : kNever),
+      samples_steps_(steps(config.samples_timeout_s)),
+      estimate_steps_(steps(config.estimate_timeout_s)),
+      release_steps_(steps(config.hold_release_s)),
+      window_part_steps_(std::max<std::uint32_t>(steps(config.overrun_window_s) / 8, 1U)),
+      missed_most_(config.overrun_ratio * static_cast<float>(steps(config.overrun_window_s))),
+      edges_allowed_(config.mode == SupervisorMode::kControl ? kAllButtons : kArmBit | kResetBit),
+      neutral_pct_(static_cast<std::uint8_t>(config.neutral_pct + 0.5F)) {
+  state_ = {.state = SupervisorState::kBoot,
+            .reason = Reason::kNone,
+            .override_pct = neutral_pct_,
+            .lows = 0,
+            .controlled = 0,
+            .forces_over = 0,
+            .force_n = 0.0F,
+            .position_pct = config.neutral_pct,
+            .fall_to_pct = config.neutral_pct,
+            .link_age = kNever,
+            .sample_age = kNever,
+            .force_age = kNever,
+            .estimate_age = 0,
+            .calm_steps = 0,
+            .missed_run = 0,
+            .window_steps = 0,
+            .window_part = 0,
+            .missed = {}};
+}
+
+constexpr std::uint32_t Supervisor::steps(float time_s) const noexcept {
+  return std::max<std::uint32_t>(static_cast<std::uint32_t>(time_s / config_.period_s + 0.5F), 1U);
+}
 
 static_assert(std::is_trivially_copyable_v<Supervisor>);
 static_assert(sizeof(Supervisor::State) == 4 + 13 * 4 + 8 * 4);

@@ -93,6 +93,9 @@ class VariableGain {
             .stability_margin_ratio = stability_margin_ratio_};
   }
 
+  // In charge after another law: as make() left it.
+  constexpr void rejoin() noexcept { state_ = {.estimate = process_gain_.initial()}; }
+
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
   constexpr void restore(const State& state) noexcept { state_ = state; }
 
@@ -102,7 +105,7 @@ class VariableGain {
       : process_gain_(*ProcessGain::make(config.estimate())),
         open_loop_ratio_(config.open_loop_1_s * config.period_s),
         stability_margin_ratio_(config.stability_margin_ratio()) {
-    state_.estimate = process_gain_.initial();
+    rejoin();
   }
 
   ProcessGain process_gain_;

@@ -28,11 +28,6 @@ constexpr float kReturn_ratio = 0.05F;  // believed as idle after a change of sp
 
 }  // namespace
 
-auto AirCut::make(const Config& config) noexcept -> std::expected<AirCut, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return AirCut{config};
-}
-
 void AirCut::tare(float y_nm, float variance_nm2, float duration_s) noexcept {
   state_.idle_s += duration_s;
   const float time_s = state_.idle_s < kTareTime_s ? state_.idle_s : kTareTime_s;

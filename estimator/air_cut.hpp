@@ -86,7 +86,8 @@ class AirCut {
     std::uint32_t was_cut = 0;
   };
 
-  [[nodiscard]] static std::expected<AirCut, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<AirCut, ConfigError> make(
+      const Config& config) noexcept;
   [[nodiscard]] Output step(const Input& input) noexcept;
 
   // The torque scale or offset changed by a calibration: average the tare anew.
@@ -99,7 +100,7 @@ class AirCut {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit AirCut(const Config& config) noexcept : config_(config) {}
+  explicit constexpr AirCut(const Config& config) noexcept : config_(config) {}
   void tare(float y_nm, float variance_nm2, float duration_s) noexcept;
   [[nodiscard]] Phase decide(const Input& input, float y_nm, float slope_nm,
                              float sign) const noexcept;
@@ -107,6 +108,11 @@ class AirCut {
   Config config_;
   State state_{};
 };
+
+constexpr auto AirCut::make(const Config& config) noexcept -> std::expected<AirCut, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return AirCut{config};
+}
 
 static_assert(std::is_trivially_copyable_v<AirCut>);
 

@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <expected>
 #include <optional>
+#include <span>
 #include <type_traits>
 
 #include "estimator/space_vector.hpp"
@@ -70,13 +71,13 @@ class AirGapPower {
   };
 
   struct State {
-    std::uint32_t sample = 0;      // of the window, 0: the next sample starts one
-    std::uint32_t started = 0;     // 0: there is no sample before the next one
-    float skip_samples = 0.0F;     // left out at the start of the window
-    std::uint32_t whole_from = 0;  // samples from here on count in full
-    float weight = 0.0F;           // sums over the window so far
-    float airgap_w = 0.0F;
-    float current_square_a2 = 0.0F;
+    std::uint32_t sample = 0;        // of the window, 0: the next sample starts one
+    std::uint32_t started = 0;       // 0: there is no sample before the next one
+    float skip_samples = 0.0F;       // left out at the start of the window
+    std::uint32_t whole_from = 0;    // samples from here on count in full
+    float weight = 0.0F;             // sums over the window so far
+    float airgap_w = 0.0F;           // of both ends of each trapezoid: twice the mean's
+    float current_square_a2 = 0.0F;  // likewise
     float difference_square_w2 = 0.0F;
     float last_airgap_w = 0.0F;
     float last_square_a2 = 0.0F;
@@ -95,8 +96,14 @@ class AirGapPower {
     return close_window();
   }
   // The same in two parts: true with the last sample of a window, which close_window() then ends.
-  [[nodiscard]] [[gnu::always_inline]] bool add(const MotorSample& sample,
-                                                float electrical_rad_s) noexcept;
+  [[nodiscard]] bool add(const MotorSample& sample, float electrical_rad_s) noexcept {
+    return add_run({&sample, 1}, electrical_rad_s);
+  }
+  // Samples of one window, at most samples_left() of them.
+  [[nodiscard]] bool add_run(std::span<const MotorSample> samples, float electrical_rad_s) noexcept;
+  [[nodiscard]] std::uint32_t samples_left() const noexcept {
+    return config_.samples_per_window - state_.sample;
+  }
   [[nodiscard]] [[gnu::always_inline]] Output close_window() noexcept;
 
   // Drops the window so far. For gaps in the signals.
@@ -109,6 +116,27 @@ class AirGapPower {
   explicit constexpr AirGapPower(const Config& config) noexcept
       : config_(config), loss_ohm_(1.5F * config.stator_resistance_ohm) {}
 
+  struct Powers {
+    float airgap_w;
+    float current_square_a2;
+  };
+  template <Mode mode>
+  [[nodiscard]] static Powers powers(const MotorSample& sample, float loss_ohm,
+                                     float power_factor_ratio) noexcept {
+    const float square = dot(sample.current_a, sample.current_a);
+    const float copper = loss_ohm * square;  // (E22)
+    float in = 0.0F;
+    if constexpr (mode == Mode::kDotProduct) {
+      in = input_power(sample);  // (E21)
+    } else {
+      in = 1.5F * power_factor_ratio *
+           std::sqrt(square * dot(sample.voltage_v, sample.voltage_v));  // (E23)
+    }
+    return {.airgap_w = in - copper, .current_square_a2 = square};
+  }
+  template <Mode mode>
+  void sum(std::span<const MotorSample> samples, float electrical_rad_s) noexcept;
+  void begin_window(const Powers& first, float electrical_rad_s) noexcept;
   [[nodiscard]] float skipped_samples(float electrical_rad_s) const noexcept;
 
   Config config_;
@@ -116,52 +144,9 @@ class AirGapPower {
   State state_{};
 };
 
-inline bool AirGapPower::add(const MotorSample& sample, float electrical_rad_s) noexcept {
-  const float square = dot(sample.current_a, sample.current_a);
-  const float copper = loss_ohm_ * square;  // (E22)
-  const float in = config_.mode == Mode::kDotProduct
-                       ? input_power(sample)  // (E21)
-                       : 1.5F * config_.power_factor_ratio *
-                             std::sqrt(square * dot(sample.voltage_v, sample.voltage_v));  // (E23)
-  const float airgap = in - copper;
-
-  if (state_.sample == 0) [[unlikely]] {
-    state_.skip_samples = skipped_samples(electrical_rad_s);
-    state_.whole_from = static_cast<std::uint32_t>(state_.skip_samples) + 2;
-    if (state_.started == 0) {
-      state_.started = 1;
-      state_.last_airgap_w = airgap;
-      state_.last_square_a2 = square;
-    }
-  }
-  ++state_.sample;
-
-  // Trapezoid between two samples, so that the mean belongs to the span between two readings of
-  // the speed, (E24).
-  const float difference = airgap - state_.last_airgap_w;
-  float power = 0.5F * (airgap + state_.last_airgap_w);
-  float current = 0.5F * (square + state_.last_square_a2);
-  float scatter = difference * difference;
-  float weight = 1.0F;
-  if (state_.sample < state_.whole_from) {
-    const float share = static_cast<float>(state_.sample) - state_.skip_samples;
-    weight = share > 0.0F ? (share < 1.0F ? share : 1.0F) : 0.0F;
-    power *= weight;
-    current *= weight;
-    scatter = weight * difference * difference;
-  }
-  state_.weight += weight;
-  state_.airgap_w += power;
-  state_.current_square_a2 += current;
-  state_.difference_square_w2 += scatter;
-  state_.last_airgap_w = airgap;
-  state_.last_square_a2 = square;
-  return state_.sample >= config_.samples_per_window;
-}
-
 inline auto AirGapPower::close_window() noexcept -> Output {
-  const float mean = state_.airgap_w / state_.weight;
-  const float square = state_.current_square_a2 / state_.weight;
+  const float mean = 0.5F * state_.airgap_w / state_.weight;
+  const float square = 0.5F * state_.current_square_a2 / state_.weight;
   const Output output{
       .airgap_power_w = mean,
       .input_power_w = mean + loss_ohm_ * square,

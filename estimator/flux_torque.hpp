@@ -19,8 +19,10 @@
 
 #include <cstdint>
 #include <expected>
+#include <span>
 #include <type_traits>
 
+#include "estimator/polynomials.hpp"
 #include "estimator/space_vector.hpp"
 
 namespace cutforce::estimator {
@@ -71,24 +73,20 @@ class FluxTorque {
     std::uint32_t samples = 0;  // since the start, saturating: the first has no predecessor
   };
 
-  [[nodiscard]] static std::expected<FluxTorque, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<FluxTorque, ConfigError> make(
+      const Config& config) noexcept;
 
-  // elapsed_periods: time since the last sample in nominal sample periods; exactly 1 normally.
-  [[gnu::always_inline]] void step(const MotorSample& sample, float elapsed_periods) noexcept {
-    if (elapsed_periods != 1.0F || state_.samples == 0) [[unlikely]] {
-      step_apart(sample, elapsed_periods);
-      return;
-    }
-    const SpaceVector e = emf(sample.voltage_v, sample.current_a);
-    integrate(e, state_.leak, state_.gain_s);
-    add(sample, e, 1.0F);
-  }
+  // Samples that follow the last one, and each other, by one period.
+  void step_run(std::span<const MotorSample> samples) noexcept;
+  // elapsed_periods: time since the last sample in nominal sample periods. With 1 the same as a run
+  // of one.
+  void step(const MotorSample& sample, float elapsed_periods) noexcept;
 
   // Closes the window. Duration 0 (no sample since the last call) gives the last torque.
   [[nodiscard]] Window take() noexcept;
 
   // Electrical frequency for the samples to come, (E63), (E64).
-  void set_frequency(float frequency_rad_s) noexcept;
+  constexpr void set_frequency(float frequency_rad_s) noexcept;
 
   // Sets the flux to the steady state of the last sample at w_e.
   void seed() noexcept;
@@ -101,46 +99,107 @@ class FluxTorque {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit FluxTorque(const Config& config) noexcept
+  static constexpr float kSlowestLeak_rad_s = 10.0F;  // the leak never acts slower than at this w_e
+  static constexpr float kSmallestFrequency_rad_s =
+      6.0F;  // below it the phase of the leak is not corrected
+
+  explicit constexpr FluxTorque(const Config& config) noexcept
       : config_(config), torque_scale_(1.5F * config.pole_pairs) {}
   struct Coefficients {
     float leak;
     SpaceVector gain_s;
   };
-  [[nodiscard]] Coefficients coefficients(float frequency_rad_s, float period_s) const noexcept;
+  [[nodiscard]] constexpr Coefficients coefficients(float frequency_rad_s,
+                                                    float period_s) const noexcept;
 
-  [[nodiscard]] SpaceVector emf(SpaceVector v, SpaceVector i) const noexcept {  // (E60)
-    return {v.alpha - config_.stator_resistance_ohm * i.alpha,
-            v.beta - config_.stator_resistance_ohm * i.beta};
+  [[nodiscard]] static SpaceVector emf(const MotorSample& sample, float ohm) noexcept {  // (E60)
+    return {sample.voltage_v.alpha - ohm * sample.current_a.alpha,
+            sample.voltage_v.beta - ohm * sample.current_a.beta};
   }
-  void integrate(SpaceVector e, float a, SpaceVector c) noexcept {  // (E61)
-    const SpaceVector sum{e.alpha + state_.emf_v.alpha, e.beta + state_.emf_v.beta};
-    const SpaceVector grown{c.alpha * sum.alpha - c.beta * sum.beta,
-                            c.alpha * sum.beta + c.beta * sum.alpha};
-    state_.flux_v_s = {a * state_.flux_v_s.alpha + grown.alpha,
-                       a * state_.flux_v_s.beta + grown.beta};
+  // What a sample changes. In locals over a run, so that it stays in registers.
+  struct Running {
+    SpaceVector flux_v_s;
+    SpaceVector emf_v;
+    float torque_nm;
+    float torque_sum_nm;
+    float moment_sum_nm;
+    float power_sum_w;
+    float current_sum_a2;
+    float elapsed_periods;
+
+    void integrate(SpaceVector e, float a, SpaceVector c) noexcept {  // (E61)
+      const SpaceVector sum{e.alpha + emf_v.alpha, e.beta + emf_v.beta};
+      const SpaceVector grown{c.alpha * sum.alpha - c.beta * sum.beta,
+                              c.alpha * sum.beta + c.beta * sum.alpha};
+      flux_v_s = {a * flux_v_s.alpha + grown.alpha, a * flux_v_s.beta + grown.beta};
+      emf_v = e;
+    }
+    void add(const MotorSample& sample, float torque_scale, float periods) noexcept {
+      const SpaceVector v = sample.voltage_v;
+      const SpaceVector i = sample.current_a;
+      const float torque = torque_scale * cross(i, flux_v_s);  // (E62)
+      const float trapezoid = (torque + torque_nm) * periods;
+      torque_sum_nm += trapezoid;
+      moment_sum_nm += trapezoid * elapsed_periods;
+      power_sum_w += dot(v, i) * periods;
+      current_sum_a2 += dot(i, i) * periods;
+      elapsed_periods += periods;
+      torque_nm = torque;
+    }
+  };
+  [[nodiscard]] Running running() const noexcept {
+    return {.flux_v_s = state_.flux_v_s,
+            .emf_v = state_.emf_v,
+            .torque_nm = state_.torque_nm,
+            .torque_sum_nm = state_.torque_sum_nm,
+            .moment_sum_nm = state_.moment_sum_nm,
+            .power_sum_w = state_.power_sum_w,
+            .current_sum_a2 = state_.current_sum_a2,
+            .elapsed_periods = state_.elapsed_periods};
   }
-  void add(const MotorSample& sample, SpaceVector e, float elapsed_periods) noexcept {
-    const SpaceVector v = sample.voltage_v;
-    const SpaceVector i = sample.current_a;
-    const float torque = torque_scale_ * cross(i, state_.flux_v_s);  // (E62)
-    const float trapezoid = (torque + state_.torque_nm) * elapsed_periods;
-    state_.torque_sum_nm += trapezoid;
-    state_.moment_sum_nm += trapezoid * state_.elapsed_periods;
-    state_.power_sum_w += dot(v, i) * elapsed_periods;
-    state_.current_sum_a2 += dot(i, i) * elapsed_periods;
-    state_.elapsed_periods += elapsed_periods;
-    state_.torque_nm = torque;
-    state_.emf_v = e;
-    state_.current_a = i;
+  void keep(const Running& r, SpaceVector current_a) noexcept {
+    state_.flux_v_s = r.flux_v_s;
+    state_.emf_v = r.emf_v;
+    state_.current_a = current_a;
+    state_.torque_nm = r.torque_nm;
+    state_.torque_sum_nm = r.torque_sum_nm;
+    state_.moment_sum_nm = r.moment_sum_nm;
+    state_.power_sum_w = r.power_sum_w;
+    state_.current_sum_a2 = r.current_sum_a2;
+    state_.elapsed_periods = r.elapsed_periods;
   }
-  // The first sample of all, or one that does not follow the last by one period.
-  void step_apart(const MotorSample& sample, float elapsed_periods) noexcept;
 
   Config config_;
   float torque_scale_;
   State state_{};
 };
+
+constexpr auto FluxTorque::make(const Config& config) noexcept
+    -> std::expected<FluxTorque, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  FluxTorque block{config};
+  block.set_frequency(0.0F);
+  return block;
+}
+
+constexpr auto FluxTorque::coefficients(float frequency_rad_s, float period_s) const noexcept
+    -> Coefficients {
+  const float size = magnitude(frequency_rad_s);
+  const float acting = size > kSlowestLeak_rad_s ? size : kSlowestLeak_rad_s;
+  const float leaked = config_.leak_ratio * acting * period_s;
+  const float a = leaked < 0.5F ? 1.0F - leaked : 0.5F;
+  const float half_angle = 0.5F * frequency_rad_s * period_s;
+  const float t_over_w = 0.5F * period_s * tan_over_x(half_angle);  // t / w_e
+  const float leak_over_w = size > kSmallestFrequency_rad_s ? (1.0F - a) / frequency_rad_s : 0.0F;
+  return {.leak = a, .gain_s = {0.5F * t_over_w * (1.0F + a), -0.5F * leak_over_w}};  // (E64)
+}
+
+constexpr void FluxTorque::set_frequency(float frequency_rad_s) noexcept {
+  const auto [leak, gain] = coefficients(frequency_rad_s, config_.sample_period_s);
+  state_.leak = leak;
+  state_.gain_s = gain;
+  state_.frequency_rad_s = frequency_rad_s;
+}
 
 static_assert(std::is_trivially_copyable_v<FluxTorque>);
 

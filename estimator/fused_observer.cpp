@@ -23,26 +23,6 @@ constexpr float kTareFollow_ratio = 0.02F;  // of what the tare belongs to, each
 
 }  // namespace
 
-FusedObserver::FusedObserver(const Config& config) noexcept
-    : flux_(*FluxTorque::make(config.flux)),
-      config_(config),
-      filter_(*LoadTorqueFilter::make(config.filter)),
-      air_(*AirCut::make(config.air)),
-      noise_({.sample_period_s = config.flux.sample_period_s,
-              .rated_torque_nm = config.filter.rated_torque_nm,
-              .sensorless = config.sensorless}),
-      inertia_(*RunUpInertia::make(config.inertia)),
-      resistance_(*StatorResistance::make(config.resistance)),
-      meter_(*PowerScale::make(config.meter)) {
-  tick_.calibrated = config.calibrate ? 0U : 1U;
-}
-
-auto FusedObserver::make(const Config& config) noexcept
-    -> std::expected<FusedObserver, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return FusedObserver{config};
-}
-
 auto FusedObserver::state() const noexcept -> State {
   return {.flux = flux_.state(),
           .filter = filter_.state(),

@@ -20,6 +20,7 @@
 #include <array>
 #include <cstdint>
 #include <expected>
+#include <span>
 #include <type_traits>
 
 #include "estimator/air_cut.hpp"
@@ -139,26 +140,29 @@ class FusedObserver {
     Tick tick;
   };
 
-  [[nodiscard]] static std::expected<FusedObserver, ConfigError> make(
+  [[nodiscard]] static constexpr std::expected<FusedObserver, ConfigError> make(
       const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays.
-  [[nodiscard]] static FusedObserver make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr FusedObserver make_checked(const Config& config) noexcept {
     return FusedObserver{config};
   }
 
   void step(const Sample& sample) noexcept {
-    step(sample.motor, sample.elapsed_periods);
-    if (sample.speed_valid) note_speed(sample.speed_rad_s);
+    flux_.step(sample.motor, sample.elapsed_periods);
+    if (sample.speed_valid) note_speeds(speed_sum_rad_s() + sample.speed_rad_s, 1);
     if (sample.meter_valid) note_meter(sample.power_meter_w);
   }
-  // The same in its parts.
-  [[gnu::always_inline]] void step(const MotorSample& motor, float elapsed_periods) noexcept {
+  // The same in its parts: samples that follow each other by one period, or one that does not,
+  void step_run(std::span<const MotorSample> motor) noexcept { flux_.step_run(motor); }
+  void step(const MotorSample& motor, float elapsed_periods) noexcept {
     flux_.step(motor, elapsed_periods);
   }
-  void note_speed(float speed_rad_s) noexcept {
-    tick_.speed_sum_rad_s += speed_rad_s;
-    ++tick_.speed_count;
+  // the sum of all speeds since the last tick, with `count` new ones in it,
+  void note_speeds(float sum_rad_s, std::uint32_t count) noexcept {
+    tick_.speed_sum_rad_s = sum_rad_s;
+    tick_.speed_count += count;
   }
+  // and the latest reading of the meter.
   void note_meter(float power_w) noexcept {
     tick_.meter_w = power_w;
     tick_.has_meter = 1;
@@ -178,7 +182,7 @@ class FusedObserver {
   void restore(const State& state) noexcept;
 
  private:
-  explicit FusedObserver(const Config& config) noexcept;
+  explicit constexpr FusedObserver(const Config& config) noexcept;
 
   struct Rotation {
     float flux_rad_s;
@@ -216,6 +220,26 @@ class FusedObserver {
   float share_of_s_ = 0.0F;  // length of the tick that share_, of (E101), belongs to
   float share_ = 0.0F;
 };
+
+constexpr auto FusedObserver::make(const Config& config) noexcept
+    -> std::expected<FusedObserver, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return FusedObserver{config};
+}
+
+constexpr FusedObserver::FusedObserver(const Config& config) noexcept
+    : flux_(*FluxTorque::make(config.flux)),
+      config_(config),
+      filter_(*LoadTorqueFilter::make(config.filter)),
+      air_(*AirCut::make(config.air)),
+      noise_({.sample_period_s = config.flux.sample_period_s,
+              .rated_torque_nm = config.filter.rated_torque_nm,
+              .sensorless = config.sensorless}),
+      inertia_(*RunUpInertia::make(config.inertia)),
+      resistance_(*StatorResistance::make(config.resistance)),
+      meter_(*PowerScale::make(config.meter)) {
+  tick_.calibrated = config.calibrate ? 0U : 1U;
+}
 
 static_assert(std::is_trivially_copyable_v<FusedObserver>);
 

@@ -51,12 +51,6 @@ bool sum_rule(const Phasor& u, const Phasor& v, const Phasor& w, float limit,
 
 }  // namespace
 
-auto IdleCalibration::make(const Config& config) noexcept
-    -> std::expected<IdleCalibration, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return IdleCalibration{config};
-}
-
 void IdleCalibration::open(float frequency_rad_s, float at_least_s) noexcept {
   state_ = State{};
   const float w = magnitude(frequency_rad_s);

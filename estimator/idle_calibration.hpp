@@ -57,7 +57,7 @@ class IdleCalibration {
     std::uint32_t filled = 0;
   };
 
-  [[nodiscard]] static std::expected<IdleCalibration, ConfigError> make(
+  [[nodiscard]] static constexpr std::expected<IdleCalibration, ConfigError> make(
       const Config& config) noexcept;
 
   // Opens a window at this electrical frequency; a window that is open starts anew.
@@ -77,11 +77,17 @@ class IdleCalibration {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit IdleCalibration(const Config& config) noexcept : config_(config) {}
+  explicit constexpr IdleCalibration(const Config& config) noexcept : config_(config) {}
 
   Config config_;
   State state_{};
 };
+
+constexpr auto IdleCalibration::make(const Config& config) noexcept
+    -> std::expected<IdleCalibration, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return IdleCalibration{config};
+}
 
 static_assert(std::is_trivially_copyable_v<IdleCalibration>);
 

@@ -12,18 +12,12 @@ constexpr float kResidualVariance = 1.2F;  // of the torque, per variance left a
 
 }  // namespace
 
-IdleTare::IdleTare(const Config& config) noexcept
-    : config_(config),
-      wait_windows_(static_cast<std::uint32_t>(config.wait_s / config.period_s + 0.5F)),
-      gain_(config.period_s / (config.period_s + config.memory_s)) {
-  state_.coulomb_nm = config.coulomb_nm;
-  state_.viscous_nm_s_rad = config.viscous_nm_s_rad;
-  // Until idle was seen, the band is at its upper limit.
-  state_.noise_variance_nm2 = config.band_most_nm * config.band_most_nm / 25.0F;
-  note_noise();
-}
-
 void IdleTare::note_noise() noexcept {
+  if (state_.acquired == 0) {
+    noise_sigma_nm_ = 0.0F;
+    band_nm_ = config_.band_most_nm;
+    return;
+  }
   noise_sigma_nm_ = std::sqrt(state_.noise_variance_nm2);
   band_nm_ = std::clamp(kBandSigmas * noise_sigma_nm_, config_.band_least_nm, config_.band_most_nm);
 }
@@ -74,10 +68,10 @@ void IdleTare::tare(Input input) noexcept {
   const float residual = input.load_torque_nm - state_.rest_torque_nm;
   state_.noise_variance_nm2 +=
       kNoiseGain * (kResidualVariance * residual * residual - state_.noise_variance_nm2);
-  note_noise();
   state_.tare_speed_rad_s = input.speed_rad_s;
   state_.age_s = 0.0F;
   state_.acquired = 1;
+  note_noise();
 
   ++state_.idle_windows;
   const float count = static_cast<float>(state_.idle_windows);

@@ -111,7 +111,8 @@ class IdleTare {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static std::expected<IdleTare, ConfigError> make(const Config& config) noexcept {
+  [[nodiscard]] static constexpr std::expected<IdleTare, ConfigError> make(
+      const Config& config) noexcept {
     if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
     return IdleTare{config};
   }
@@ -129,7 +130,7 @@ class IdleTare {
  private:
   static constexpr float kRestMemory = 8.0F;  // windows in the mean of the torque at rest
 
-  explicit IdleTare(const Config& config) noexcept;
+  explicit constexpr IdleTare(const Config& config) noexcept;
 
   void note_noise() noexcept;
   [[nodiscard]] float idle_torque(float speed_rad_s) const noexcept {
@@ -150,9 +151,9 @@ class IdleTare {
 
   Config config_;
   std::uint32_t wait_windows_;
-  float gain_;            // of the tare, a window
-  float noise_sigma_nm_;  // of State::noise_variance_nm2, which moves in idle only
-  float band_nm_;         // likewise
+  float gain_;                   // of the tare, a window
+  float noise_sigma_nm_ = 0.0F;  // of State::noise_variance_nm2, which moves in idle only
+  float band_nm_;                // likewise; at its upper limit until idle was seen
   State state_{};
 };
 
@@ -185,6 +186,16 @@ constexpr std::expected<void, IdleTare::ConfigError> IdleTare::Config::check() c
     return std::unexpected{ConfigError::kSpeeds};
   }
   return {};
+}
+
+constexpr IdleTare::IdleTare(const Config& config) noexcept
+    : config_(config),
+      wait_windows_(static_cast<std::uint32_t>(config.wait_s / config.period_s + 0.5F)),
+      gain_(config.period_s / (config.period_s + config.memory_s)),
+      band_nm_(config.band_most_nm) {
+  state_.coulomb_nm = config.coulomb_nm;
+  state_.viscous_nm_s_rad = config.viscous_nm_s_rad;
+  state_.noise_variance_nm2 = config.band_most_nm * config.band_most_nm / 25.0F;
 }
 
 }  // namespace cutforce::estimator

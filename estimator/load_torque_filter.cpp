@@ -120,12 +120,6 @@ struct Shared {
 
 }  // namespace
 
-auto LoadTorqueFilter::make(const Config& config) noexcept
-    -> std::expected<LoadTorqueFilter, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return LoadTorqueFilter{config};
-}
-
 void LoadTorqueFilter::start(float speed_rad_s, float speed_sigma_rad_s, float torque_nm,
                              float torque_sigma_nm) noexcept {
   for (Model& m : state_.models) {

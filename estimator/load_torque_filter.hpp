@@ -80,7 +80,7 @@ class LoadTorqueFilter {
     std::uint32_t started = 0;
   };
 
-  [[nodiscard]] static std::expected<LoadTorqueFilter, ConfigError> make(
+  [[nodiscard]] static constexpr std::expected<LoadTorqueFilter, ConfigError> make(
       const Config& config) noexcept;
 
   [[nodiscard]] Output step(const Input& input, const Noise& noise) noexcept;
@@ -96,11 +96,17 @@ class LoadTorqueFilter {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit LoadTorqueFilter(const Config& config) noexcept : config_(config) {}
+  explicit constexpr LoadTorqueFilter(const Config& config) noexcept : config_(config) {}
 
   Config config_;
   State state_{};
 };
+
+constexpr auto LoadTorqueFilter::make(const Config& config) noexcept
+    -> std::expected<LoadTorqueFilter, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return LoadTorqueFilter{config};
+}
 
 static_assert(std::is_trivially_copyable_v<LoadTorqueFilter>);
 

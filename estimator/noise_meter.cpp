@@ -19,18 +19,8 @@ constexpr float kCoarse_rad_s = 0.3F;  // a finer quantum is the number format's
 constexpr float kWhiteBeat = 0.25F;    // of the tick rate
 constexpr float kSlowestBeat = 0.03F;
 constexpr std::uint32_t kSureQuantised = 60;
-constexpr float kFirstSpeed_rad_s = 0.03F;
-constexpr float kFirstTorque_ratio = 0.02F;
 
 }  // namespace
-
-NoiseMeter::NoiseMeter(const Config& config) noexcept : config_(config) {
-  const float torque_nm = kFirstTorque_ratio * config.rated_torque_nm;
-  state_.noise = {.speed_variance = kFirstSpeed_rad_s * kFirstSpeed_rad_s,
-                  .angle_variance = 0.0F,
-                  .torque_variance = torque_nm * torque_nm,
-                  .centre_ratio = 0.0F};
-}
 
 bool NoiseMeter::counts() const noexcept { return state_.quantised >= kSureQuantised; }
 

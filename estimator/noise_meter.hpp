@@ -76,7 +76,7 @@ class NoiseMeter {
     float noise_duration_s = 0.0F;  // of the tick that it was found for; 0: to be found anew
   };
 
-  explicit NoiseMeter(const Config& config) noexcept;
+  explicit constexpr NoiseMeter(const Config& config) noexcept;
 
   void step(const Input& input) noexcept;
 
@@ -95,6 +95,9 @@ class NoiseMeter {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
+  static constexpr float kFirstSpeed_rad_s = 0.03F;
+  static constexpr float kFirstTorque_ratio = 0.02F;
+
   void close_block(bool of_speed) noexcept;
   void find_quantum(float change_rad_s) noexcept;
   void set_noise(float duration_s) noexcept;
@@ -102,6 +105,14 @@ class NoiseMeter {
   Config config_;
   State state_{};
 };
+
+constexpr NoiseMeter::NoiseMeter(const Config& config) noexcept : config_(config) {
+  const float torque_nm = kFirstTorque_ratio * config.rated_torque_nm;
+  state_.noise = {.speed_variance = kFirstSpeed_rad_s * kFirstSpeed_rad_s,
+                  .angle_variance = 0.0F,
+                  .torque_variance = torque_nm * torque_nm,
+                  .centre_ratio = 0.0F};
+}
 
 static_assert(std::is_trivially_copyable_v<NoiseMeter>);
 

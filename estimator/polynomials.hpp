@@ -96,8 +96,9 @@ namespace cutforce::estimator {
   return r + (poly * r * z - 2.12194440e-4F * n - 0.5F * z) + 0.693359375F * n;
 }
 
-// x^p for normal positive x and |p ln x| <= 87; relative error <= 2e-7 + 4e-7 |p ln x|.
-[[nodiscard]] constexpr float power_positive(float x, float p) noexcept {
+// x^p for normal positive x and |p ln x| <= 87; relative error <= 2e-7 + 4e-7 |p ln x|. Not inlined:
+// it is 300 bytes of code, and its dozen callers save 3 instructions of 70.
+[[nodiscard]] [[gnu::noinline]] constexpr float power_positive(float x, float p) noexcept {
   return p == 1.0F ? x : exp_bounded(p * log_positive(x));
 }
 

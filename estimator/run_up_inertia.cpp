@@ -16,16 +16,6 @@ constexpr float kFarthest_sigmas = 2.0F;
 
 }  // namespace
 
-RunUpInertia::RunUpInertia(const Config& config) noexcept : config_(config) {
-  state_.inertia_kg_m2 = config.inertia_kg_m2;
-  state_.sigma_ratio = config.inertia_sigma_ratio;
-}
-
-auto RunUpInertia::make(const Config& config) noexcept -> std::expected<RunUpInertia, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return RunUpInertia{config};
-}
-
 void RunUpInertia::forget_episode() noexcept {
   state_.impulse_nm_s = state_.gained_rad_s = state_.time_s = state_.turned_rad = 0.0F;
   state_.calibrated = 1;

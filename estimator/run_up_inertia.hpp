@@ -59,7 +59,8 @@ class RunUpInertia {
     std::uint32_t seen = 0;
   };
 
-  [[nodiscard]] static std::expected<RunUpInertia, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<RunUpInertia, ConfigError> make(
+      const Config& config) noexcept;
   void step(const Input& input) noexcept;
 
   [[nodiscard]] float inertia_kg_m2() const noexcept { return state_.inertia_kg_m2; }
@@ -68,13 +69,24 @@ class RunUpInertia {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit RunUpInertia(const Config& config) noexcept;
+  explicit constexpr RunUpInertia(const Config& config) noexcept;
   void close(float tare_nm) noexcept;
   void forget_episode() noexcept;
 
   Config config_;
   State state_{};
 };
+
+constexpr auto RunUpInertia::make(const Config& config) noexcept
+    -> std::expected<RunUpInertia, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return RunUpInertia{config};
+}
+
+constexpr RunUpInertia::RunUpInertia(const Config& config) noexcept : config_(config) {
+  state_.inertia_kg_m2 = config.inertia_kg_m2;
+  state_.sigma_ratio = config.inertia_sigma_ratio;
+}
 
 static_assert(std::is_trivially_copyable_v<RunUpInertia>);
 

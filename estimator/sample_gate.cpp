@@ -16,9 +16,6 @@ constexpr Fault named(float x) noexcept {
   return magnitude(x) < kInfinity ? Fault::kOutOfRange : Fault::kNonFinite;
 }
 
-// The positive end of 10 bits and more lies above this share of the range.
-constexpr float kEnd = 0.998F;
-
 struct Kind {
   const Triple& value;
   float limit;
@@ -46,34 +43,7 @@ bool usable(const Kind& kind, FaultSet& faults, std::uint32_t& at_end) noexcept 
 
 }  // namespace
 
-auto SampleGate::make(const Config& config) noexcept -> std::expected<SampleGate, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  const auto in_ns = [](float s) { return static_cast<std::uint32_t>(s * 1e9F + 0.5F); };
-  const std::uint32_t period_ns = in_ns(config.sample_period_s);
-  const std::uint32_t tolerance_ns = period_ns / 100;
-  const float voltage_end_v = kEnd * config.voltage_limit_v;
-  const float current_end_a = kEnd * config.current_limit_a;
-  return SampleGate{{.period_ns = period_ns,
-                     .tolerance_ns = tolerance_ns,
-                     .gap_ns = in_ns(config.gap_limit_s),
-                     .periods_per_ns = 1.0F / static_cast<float>(period_ns),
-                     .voltage_v = config.voltage_limit_v,
-                     .current_a = config.current_limit_a,
-                     .voltage_end_v = voltage_end_v,
-                     .current_end_a = current_end_a,
-                     .speed_rad_s = config.speed_limit_rad_s,
-                     .power_w = config.power_limit_w,
-                     .bridge = config.bridge_limit,
-                     .clock = config.clock_limit,
-                     .early_ns = period_ns - tolerance_ns,
-                     .window_ns = 2 * tolerance_ns,
-                     .voltage_end_square_v2 = voltage_end_v * voltage_end_v,
-                     .current_end_square_a2 = current_end_a * current_end_a,
-                     .speed_bits = magnitude_bits(config.speed_limit_rad_s),
-                     .power_bits = magnitude_bits(config.power_limit_w)}};
-}
-
-auto SampleGate::step_carefully(const Input& input) noexcept -> Output {
+auto SampleGate::step(const Input& input) noexcept -> Output {
   if (state_.started != 0 && not_later(input.time_ns)) {
     FaultSet faults;
     faults.insert(Fault::kTimeOrder);
@@ -134,8 +104,10 @@ void SampleGate::pass_time(const Input& input, Output& output) const noexcept { 
     return;
   }
   // At most 2 s, so 32 bits hold it and the conversion is one instruction everywhere.
-  output.elapsed_periods =
+  const float periods =
       static_cast<float>(static_cast<std::uint32_t>(since)) * limits_.periods_per_ns;
+  output.elapsed_periods =
+      static_cast<float>(static_cast<std::uint32_t>(1024.0F * periods + 0.5F)) * (1.0F / 1024.0F);
   if (!(output.elapsed_periods > 1.5F)) return;
   output.faults.insert(Fault::kGap);
   output.missing_samples = static_cast<std::uint32_t>(output.elapsed_periods + 0.5F) - 1U;

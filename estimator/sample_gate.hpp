@@ -16,13 +16,17 @@
 // Cost of a usual sample: 6 multiplications, 4 additions and 2 comparisons for six channels,
 // because |x|^2 summed over three channels below (0.998 limit)^2 clears all three at once (E9); one
 // 64-bit subtraction for the time, whose comparison then fits into 32 bits; one integer comparison
-// each for speed and power; a copy of eight values.
+// each for speed, power and what is there. Samples come in runs, so that the last good values are
+// kept once a run, and elapsed periods in 1024ths, so that their sums are the same however samples
+// are grouped.
 #pragma once
 
 #include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <expected>
+#include <span>
 #include <type_traits>
 
 #include "estimator/fault.hpp"
@@ -77,8 +81,9 @@ class SampleGate {
   struct Output {
     Verdict verdict;
     FaultSet faults;
-    float elapsed_periods;          // since the last sample that passed; 1 within 1 % of nominal;
-                                    // 1 on the first sample and on a restart; 0 on a drop
+    float elapsed_periods;          // since the last sample that passed, in whole 1024ths; 1 within
+                                    // 1 % of nominal; 1 on the first sample and on a restart; 0 on
+                                    // a drop
     std::uint32_t at_end_channels;  // bit 0..2 voltages, 3..5 currents: within 0.2 % of the limit
     std::uint32_t missing_samples;  // nominal samples between the last one that passed and this
     std::uint32_t present;          // what values() holds of speed and power
@@ -97,32 +102,23 @@ class SampleGate {
     std::uint32_t unusual = 1;   // 0: started, and none of the counts above is running
   };
 
-  [[nodiscard]] static std::expected<SampleGate, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<SampleGate, ConfigError> make(
+      const Config& config) noexcept;
 
-  // A usual sample at its usual time after another is dealt with here, all else elsewhere; what
-  // comes out is the same.
-  [[nodiscard]] Output step(const Input& input) noexcept {
-    if (!accepts(input.time_ns, input.values, input.present)) [[unlikely]]
-      return step_carefully(input);
-    return {.verdict = Verdict::kAccept,
-            .faults = {},
-            .elapsed_periods = 1.0F,
-            .at_end_channels = 0,
-            .missing_samples = 0,
-            .present = input.present};
-  }
+  // Whatever comes; what the usual sample takes is in accept_run().
+  [[nodiscard]] Output step(const Input& input) noexcept;
 
-  // The usual sample alone: accepted, without faults, one period after the last. False where step()
-  // has to look closer; nothing is changed then.
-  [[nodiscard]] bool accepts(std::int64_t time_ns, const Values& values,
-                             std::uint32_t present) noexcept {
-    if (!usual(time_ns, values, present)) [[unlikely]]
-      return false;
-    state_.last_good = values;
-    state_.last_present = present;
-    state_.last_time_ns = time_ns;
-    return true;
-  }
+  // Accepts usual samples from the front of `rows`, as long as one follows another: in range, one
+  // period after the last, and with speed and power there or not as in the first of them. Each
+  // does what step() would do for it, without a fault and with elapsed_periods 1; state() is the
+  // last one's. `accepted` is called with each row. Where it stops, step() has to look closer at
+  // the next.
+  //
+  // A row has time_ns, voltage_v, current_a, speed_rad_s, power_meter_w and present, as hal::Sample
+  // does; bit `present_shift` of present is kSpeed, the next kPower. Rows that differ in any bit of
+  // it are not of one run.
+  template <unsigned present_shift, class Row, class Accepted>
+  [[gnu::always_inline]] void accept_run(std::span<const Row> rows, Accepted&& accepted) noexcept;
 
   // To go on with after step(): finite and in range whatever the verdict.
   [[nodiscard]] const Values& values() const noexcept { return state_.last_good; }
@@ -131,6 +127,9 @@ class SampleGate {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
+  // The positive end of 10 bits and more lies above this share of the range.
+  static constexpr float kEnd = 0.998F;
+
   struct Limits {
     std::int64_t period_ns;
     std::int64_t tolerance_ns;  // 1 % of the period
@@ -153,31 +152,16 @@ class SampleGate {
     std::uint32_t power_bits;
   };
 
-  explicit SampleGate(const Limits& limits) noexcept : limits_(limits) {}
+  explicit constexpr SampleGate(const Limits& limits) noexcept : limits_(limits) {}
 
   [[nodiscard]] static float square(const std::array<float, 3>& x) noexcept {
     return x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
   }
   // Not negative floats order like their bits, and NaN lies above infinity: a comparison of
   // integers takes two instructions less than one of floats on a Cortex-M.
-  [[nodiscard]] static std::uint32_t magnitude_bits(float x) noexcept {
+  [[nodiscard]] static constexpr std::uint32_t magnitude_bits(float x) noexcept {
     return std::bit_cast<std::uint32_t>(x) & 0x7FFF'FFFFU;
   }
-  [[nodiscard]] bool usual(std::int64_t time_ns, const Values& v,
-                           std::uint32_t present) const noexcept {  // (E9), (E10)
-    const std::uint64_t since =
-        static_cast<std::uint64_t>(time_ns) - static_cast<std::uint64_t>(state_.last_time_ns);
-    const auto all_or_nothing = [present](std::uint32_t which, std::uint32_t limit) {
-      return (present & which) != 0 ? limit : 0U;
-    };
-    return state_.unusual == 0 && since >> 32U == 0 &&
-           static_cast<std::uint32_t>(since) - limits_.early_ns <= limits_.window_ns &&
-           magnitude_bits(v.speed_rad_s) <= all_or_nothing(kSpeed, limits_.speed_bits) &&
-           magnitude_bits(v.power_w) <= all_or_nothing(kPower, limits_.power_bits) &&
-           square(v.voltage_v) < limits_.voltage_end_square_v2 &&
-           square(v.current_a) < limits_.current_end_square_a2;
-  }
-  [[nodiscard]] Output step_carefully(const Input& input) noexcept;
   [[nodiscard]] bool not_later(std::int64_t time_ns) noexcept;
   [[nodiscard]] Output refused(FaultSet faults) const noexcept;
   void pass_time(const Input& input, Output& output) const noexcept;
@@ -200,6 +184,74 @@ constexpr std::expected<void, SampleGate::ConfigError> SampleGate::Config::check
   if (bridge_limit > kMostCount) return std::unexpected{ConfigError::kBridgeLimit};
   if (clock_limit > kMostCount) return std::unexpected{ConfigError::kClockLimit};
   return {};
+}
+
+constexpr auto SampleGate::make(const Config& config) noexcept
+    -> std::expected<SampleGate, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  const auto in_ns = [](float s) { return static_cast<std::uint32_t>(s * 1e9F + 0.5F); };
+  const std::uint32_t period_ns = in_ns(config.sample_period_s);
+  const std::uint32_t tolerance_ns = period_ns / 100;
+  const float voltage_end_v = kEnd * config.voltage_limit_v;
+  const float current_end_a = kEnd * config.current_limit_a;
+  return SampleGate{{.period_ns = period_ns,
+                     .tolerance_ns = tolerance_ns,
+                     .gap_ns = in_ns(config.gap_limit_s),
+                     .periods_per_ns = 1.0F / static_cast<float>(period_ns),
+                     .voltage_v = config.voltage_limit_v,
+                     .current_a = config.current_limit_a,
+                     .voltage_end_v = voltage_end_v,
+                     .current_end_a = current_end_a,
+                     .speed_rad_s = config.speed_limit_rad_s,
+                     .power_w = config.power_limit_w,
+                     .bridge = config.bridge_limit,
+                     .clock = config.clock_limit,
+                     .early_ns = period_ns - tolerance_ns,
+                     .window_ns = 2 * tolerance_ns,
+                     .voltage_end_square_v2 = voltage_end_v * voltage_end_v,
+                     .current_end_square_a2 = current_end_a * current_end_a,
+                     .speed_bits = magnitude_bits(config.speed_limit_rad_s),
+                     .power_bits = magnitude_bits(config.power_limit_w)}};
+}
+
+template <unsigned present_shift, class Row, class Accepted>
+inline void SampleGate::accept_run(std::span<const Row> rows, Accepted&& accepted) noexcept {
+  if (rows.empty() || state_.unusual != 0) return;
+  // In locals, because what `accepted` writes might be the limits, for all that the compiler knows.
+  const std::uint32_t early_ns = limits_.early_ns;
+  const std::uint32_t window_ns = limits_.window_ns;
+  const float voltage_end_square_v2 = limits_.voltage_end_square_v2;
+  const float current_end_square_a2 = limits_.current_end_square_a2;
+  const std::uint32_t carried = rows.front().present;
+  const std::uint32_t present = carried >> present_shift & (kSpeed | kPower);
+  const std::uint32_t speed_bits = (present & kSpeed) != 0 ? limits_.speed_bits : 0U;
+  const std::uint32_t power_bits = (present & kPower) != 0 ? limits_.power_bits : 0U;
+  // The earliest usual time of the next.
+  std::uint64_t earliest_ns = static_cast<std::uint64_t>(state_.last_time_ns) + early_ns;
+  const Row* row = rows.data();
+  const Row* const end = row + rows.size();
+  for (; row != end; ++row) {
+    const auto now_ns = static_cast<std::uint64_t>(row->time_ns);
+    const std::uint64_t late_ns = now_ns - earliest_ns;
+    const bool usual =  // (E9), (E10)
+        late_ns >> 32U == 0 && static_cast<std::uint32_t>(late_ns) <= window_ns &&
+        row->present == carried && magnitude_bits(row->speed_rad_s) <= speed_bits &&
+        magnitude_bits(row->power_meter_w) <= power_bits &&
+        square(row->voltage_v) < voltage_end_square_v2 &&
+        square(row->current_a) < current_end_square_a2;
+    if (!usual) [[unlikely]]
+      break;
+    earliest_ns = now_ns + early_ns;
+    accepted(*row);
+  }
+  if (row == rows.data()) return;
+  const Row& last = row[-1];
+  state_.last_good.voltage_v = last.voltage_v;
+  state_.last_good.current_a = last.current_a;
+  state_.last_good.speed_rad_s = last.speed_rad_s;
+  state_.last_good.power_w = last.power_meter_w;
+  state_.last_present = present;
+  state_.last_time_ns = last.time_ns;
 }
 
 static_assert(std::is_trivially_copyable_v<SampleGate>);

@@ -19,11 +19,6 @@ constexpr float kLongAgo_s = 1e3F;  // where the time since the last clipping re
 
 }  // namespace
 
-auto SignalHealth::make(const Config& config) noexcept -> std::expected<SignalHealth, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return SignalHealth{config};
-}
-
 void SignalHealth::raise(Fault fault) noexcept {
   // Half a tick more, so that a hold of 0 still shows for the tick that saw it.
   state_.left_s[static_cast<std::size_t>(fault)] = config_.hold_s + 0.5F * config_.tick_period_s;

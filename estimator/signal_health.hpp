@@ -7,17 +7,15 @@
 //                  frequency changes by 20 %
 //   lost_phase     a channel whose fundamental and mean are below 1/4 of the largest of its kind
 //   phase_order    at steady frequency, for 0.3 s: voltage and current turn in opposite senses, or
-//   a
-//                  negative sequence or a residual above 1/3 of the positive sequence; for 1 s:
+//                  a negative sequence or a residual above 1/3 of the positive sequence; for 1 s:
 //                  reactive power below -0.1 S (an induction machine always takes some) or active
 //                  power below -0.2 S (braking changes the speed)
 //   raw_pwm        see raw_pwm.hpp; or for 0.15 s a voltage below 5 % of what rated flux induces;
-//   or
-//                  for 1.5 s at steady frequency the flux |v - R_s i|/w_e outside 0.3 to 1.5 of its
-//                  rated value
+//                  or for 1.5 s at steady frequency the flux |v - R_s i|/w_e outside 0.3 to 1.5 of
+//                  its rated value
 //   clipped        within one electrical period in two ticks at the end of the range, or a current
-//   twice
-//                  flat for more than T_e/12 (voltages may be: a line voltage in overmodulation is)
+//                  twice flat for more than T_e/12 (voltages may be: a line voltage in
+//                  overmodulation is)
 //
 // Nothing that needs rotation is judged below `minimum_frequency_rad_s`, with the frequency
 // unknown, or while the current does not turn at it. A fault stays for `hold_s` after it was last
@@ -143,31 +141,41 @@ class SignalHealth {
     float speed_frequency_rad_s = 0.0F;  // when it last changed
   };
 
-  [[nodiscard]] static std::expected<SignalHealth, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<SignalHealth, ConfigError> make(
+      const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays.
-  [[nodiscard]] static SignalHealth make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr SignalHealth make_checked(const Config& config) noexcept {
     return SignalHealth{config};
   }
 
-  // Every sample that passed the gate; in two parts, so that a sample need not be made an
-  // observation that nobody looks at.
+  // Every sample that passed the gate.
   void observe(const Observation& observation) noexcept {
-    if (wants(observation.elapsed_periods, observation.at_end_channels)) look(observation);
+    state_.elapsed_periods += observation.elapsed_periods;
+    state_.at_end_channels |= observation.at_end_channels;
+    if (state_.countdown-- != 0) return;
+    look(observation.voltage_v, observation.current_a, observation.motor,
+         observation.current_residual_a, 0);
   }
-  [[nodiscard]] bool wants(float elapsed_periods, std::uint32_t at_end_channels) noexcept {
-    state_.elapsed_periods += elapsed_periods;
-    state_.at_end_channels |= at_end_channels;
-    return state_.countdown-- == 0;
+  // The same for `count` samples that follow each other by one period, none at the end of a range:
+  // the one to look(), or `count`.
+  [[nodiscard]] std::uint32_t wanted(std::uint32_t count) noexcept {
+    const auto place = static_cast<std::uint32_t>(state_.countdown);  // negative: beyond any run
+    state_.countdown -= static_cast<std::int32_t>(count);
+    state_.elapsed_periods += static_cast<float>(place < count ? place + 1 : count);
+    return place < count ? place : count;
   }
-  void look(const Observation& observation) noexcept {
-    const auto& v = observation.voltage_v;
-    const auto& i = observation.current_a;
-    state_.picked = {.channel = {v[0], v[1], v[2], i[0], i[1], i[2]},
-                     .motor = observation.motor,
-                     .current_residual_a = observation.current_residual_a,
-                     .angle_rad = 0.0F};
+  // samples_since: those counted with this one that follow it.
+  void look(const std::array<float, 3>& voltage_v, const std::array<float, 3>& current_a,
+            const MotorSample& motor, float current_residual_a,
+            std::uint32_t samples_since) noexcept {
+    const auto& v = voltage_v;
+    const auto& i = current_a;
+    state_.picked.channel = {v[0], v[1], v[2], i[0], i[1], i[2]};
+    state_.picked.motor = motor;
+    state_.picked.current_residual_a = current_residual_a;
+    state_.picked.angle_rad = 0.0F;
     state_.picked_periods = state_.elapsed_periods;
-    state_.elapsed_periods = 0.0F;
+    state_.elapsed_periods = static_cast<float>(samples_since);
     state_.is_picked = 1;
   }
 
@@ -188,7 +196,7 @@ class SignalHealth {
     const PeriodPhasors::Input& sample;
   };
 
-  explicit SignalHealth(const Config& config) noexcept : config_(config) {}
+  explicit constexpr SignalHealth(const Config& config) noexcept : config_(config) {}
 
   void raise(Fault fault) noexcept;
   void next_place() noexcept;
@@ -232,6 +240,12 @@ constexpr std::expected<void, SignalHealth::ConfigError> SignalHealth::Config::c
     return fail(ConfigError::kRating);
   if (!(hold_s >= 0.0F && hold_s <= 60.0F)) return fail(ConfigError::kHold);
   return {};
+}
+
+constexpr auto SignalHealth::make(const Config& config) noexcept
+    -> std::expected<SignalHealth, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return SignalHealth{config};
 }
 
 static_assert(std::is_trivially_copyable_v<SignalHealth>);

@@ -15,26 +15,8 @@ constexpr float kSteady_ratio = 0.02F;      // torque may move by this much of r
 constexpr float kScatterShare = 0.2F;
 constexpr float kScatterCount = 12.0F;  // slow noise: blocks are not independent
 constexpr float kStandsOut_sigmas = 1.6F;
-constexpr float kLargestRise_ratio = 1.0F;  // of the resistance in use
-constexpr float kLargestFall_ratio = 0.5F;
 
 }  // namespace
-
-StatorResistance::StatorResistance(const Config& config) noexcept : config_(config) {
-  const float a = config.rotor_resistance_ohm / (1.5F * config.pole_pairs);
-  const float sa = config.rotor_sigma_ratio * a;
-  const float sr = a * config.resistance_sigma_ratio * config.stator_resistance_ohm;
-  const float sf = a * config.iron_torque_sigma_nm;
-  state_.mean = {a, 0.0F, a * config.iron_torque_nm};
-  state_.covariance = {sa * sa, 0.0F, 0.0F, sr * sr, 0.0F, sf * sf};
-  find_change();
-}
-
-auto StatorResistance::make(const Config& config) noexcept
-    -> std::expected<StatorResistance, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return StatorResistance{config};
-}
 
 void StatorResistance::step(const Input& in) noexcept {
   auto& s = state_.sums;
@@ -115,20 +97,6 @@ void StatorResistance::learn() noexcept {
   if (!(p00 > 0.0F)) p00 = 0.0F;
   if (!(p11 > 0.0F)) p11 = 0.0F;
   if (!(p22 > 0.0F)) p22 = 0.0F;
-}
-
-void StatorResistance::find_change() noexcept {
-  const float a = state_.mean[0];
-  if (!(a > 0.0F)) {
-    change_ohm_ = 0.0F;
-    change_sigma_ohm_ = config_.resistance_sigma_ratio * config_.stator_resistance_ohm;
-    return;
-  }
-  const float change = state_.mean[1] / a;
-  const float most = kLargestRise_ratio * config_.stator_resistance_ohm;
-  const float least = -kLargestFall_ratio * config_.stator_resistance_ohm;
-  change_ohm_ = change > most ? most : (change < least ? least : change);
-  change_sigma_ohm_ = std::sqrt(state_.covariance[3]) / a;
 }
 
 }  // namespace cutforce::estimator

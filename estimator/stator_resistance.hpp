@@ -14,6 +14,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <expected>
 #include <type_traits>
@@ -68,7 +69,7 @@ class StatorResistance {
     std::uint32_t blocks = 0;  // in a row
   };
 
-  [[nodiscard]] static std::expected<StatorResistance, ConfigError> make(
+  [[nodiscard]] static constexpr std::expected<StatorResistance, ConfigError> make(
       const Config& config) noexcept;
   void step(const Input& input) noexcept;
 
@@ -83,15 +84,48 @@ class StatorResistance {
   }
 
  private:
-  explicit StatorResistance(const Config& config) noexcept;
+  static constexpr float kLargestRise_ratio = 1.0F;  // of the resistance in use
+  static constexpr float kLargestFall_ratio = 0.5F;
+
+  explicit constexpr StatorResistance(const Config& config) noexcept;
   void learn() noexcept;
-  void find_change() noexcept;
+  constexpr void find_change() noexcept;
 
   Config config_;
   float change_ohm_ = 0.0F;  // dR
   float change_sigma_ohm_ = 0.0F;
   State state_{};
 };
+
+constexpr auto StatorResistance::make(const Config& config) noexcept
+    -> std::expected<StatorResistance, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return StatorResistance{config};
+}
+
+constexpr StatorResistance::StatorResistance(const Config& config) noexcept : config_(config) {
+  const float a = config.rotor_resistance_ohm / (1.5F * config.pole_pairs);
+  const float sa = config.rotor_sigma_ratio * a;
+  const float sr = a * config.resistance_sigma_ratio * config.stator_resistance_ohm;
+  const float sf = a * config.iron_torque_sigma_nm;
+  state_.mean = {a, 0.0F, a * config.iron_torque_nm};
+  state_.covariance = {sa * sa, 0.0F, 0.0F, sr * sr, 0.0F, sf * sf};
+  find_change();
+}
+
+constexpr void StatorResistance::find_change() noexcept {
+  const float a = state_.mean[0];
+  if (!(a > 0.0F)) {
+    change_ohm_ = 0.0F;
+    change_sigma_ohm_ = config_.resistance_sigma_ratio * config_.stator_resistance_ohm;
+    return;
+  }
+  const float change = state_.mean[1] / a;
+  const float most = kLargestRise_ratio * config_.stator_resistance_ohm;
+  const float least = -kLargestFall_ratio * config_.stator_resistance_ohm;
+  change_ohm_ = change > most ? most : (change < least ? least : change);
+  change_sigma_ohm_ = std::sqrt(state_.covariance[3]) / a;
+}
 
 static_assert(std::is_trivially_copyable_v<StatorResistance>);
 

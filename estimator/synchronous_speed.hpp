@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <expected>
 #include <optional>
+#include <span>
 #include <type_traits>
 
 #include "estimator/polynomials.hpp"
@@ -115,7 +116,9 @@ class SynchronousSpeed {
     return close_window();
   }
   // The same in two parts: true with the last sample of a window, which close_window() then ends.
-  [[nodiscard]] [[gnu::always_inline]] bool add(const MotorSample& sample) noexcept;
+  [[nodiscard]] bool add(const MotorSample& sample) noexcept { return add_run({&sample, 1}); }
+  // Samples of one window.
+  [[nodiscard]] bool add_run(std::span<const MotorSample> samples) noexcept;
   [[nodiscard]] [[gnu::always_inline]] Output close_window() noexcept;
 
   // Drops the window and the flux so far. For gaps in the signals.
@@ -149,32 +152,6 @@ class SynchronousSpeed {
   float least_square_a2_;
   State state_{};
 };
-
-inline bool SynchronousSpeed::add(const MotorSample& sample) noexcept {
-  const SpaceVector i = sample.current_a;
-  const float ohm = config_.stator_resistance_ohm;
-  const SpaceVector emf{.alpha = sample.voltage_v.alpha - ohm * i.alpha,
-                        .beta = sample.voltage_v.beta - ohm * i.beta};
-  // (E28)
-  const SpaceVector flux{
-      .alpha = flux_keep_ * state_.flux_vs.alpha + flux_gain_s_ * (emf.alpha + state_.emf_v.alpha),
-      .beta = flux_keep_ * state_.flux_vs.beta + flux_gain_s_ * (emf.beta + state_.emf_v.beta)};
-  state_.flux_vs = flux;
-  state_.emf_v = emf;
-  const SpaceVector rotor_flux{.alpha = flux.alpha - config_.leakage_inductance_h * i.alpha,
-                               .beta = flux.beta - config_.leakage_inductance_h * i.beta};
-  const SpaceVector vector = config_.vector == Vector::kFlux ? rotor_flux : i;
-  // Before the first sample stands the null vector, from which nothing has turned.
-  const float turned = angle_of(dot(vector, state_.vector), cross(vector, state_.vector));
-  state_.vector = vector;
-
-  ++state_.sample;
-  state_.angle_rad += turned;
-  if (state_.sample > config_.samples_per_window - end_samples_) state_.angle_end_rad += turned;
-  state_.flux_square_v2s2 += dot(rotor_flux, rotor_flux);
-  state_.current_square_a2 += dot(i, i);
-  return state_.sample >= config_.samples_per_window;
-}
 
 inline auto SynchronousSpeed::close_window() noexcept -> Output {
   const float electrical = state_.angle_rad / window_s_;  // (E26)

@@ -1,35 +1,22 @@
 #include "estimator/torque_path.hpp"
 
 namespace cutforce::estimator {
-auto TorquePath::make(const Config& config) noexcept -> std::expected<TorquePath, ConfigError> {
-  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
-  return TorquePath{config};
+
+bool TorquePath::add_motor(std::span<const MotorSample> motor) noexcept {
+  const bool power_ends = blocks_.power.add_run(motor, sums_.electrical_rad_s);
+  return blocks_.synchronous.add_run(motor) && power_ends;
 }
 
-TorquePath::TorquePath(const Config& config) noexcept
-    : settings_{.method = config.method,
-                .speed = config.speed,
-                .samples_per_window = config.power.samples_per_window,
-                .count = static_cast<float>(config.power.samples_per_window),
-                .pole_pairs = config.synchronous.pole_pairs,
-                .slip_ohm = 1.5F * config.synchronous.pole_pairs * config.synchronous.pole_pairs,
-                .loss_sigma_ohm = 1.5F * config.power.stator_resistance_ohm *
-                                  config.stator_resistance_sigma_ratio,
-                .speed_variance_nm2 = 0.0F,
-                .rotor_resistance_ohm = config.rotor_resistance_ohm,
-                .rated_torque_nm = config.rated_torque_nm,
-                .rated_slip_ratio = config.rated_slip_ratio,
-                .inertia_sigma_ratio = config.inertia_sigma_ratio,
-                .minimum_speed_rad_s = config.minimum_speed_rad_s},
-      blocks_{.power = *AirGapPower::make(config.power),
-              .synchronous = *SynchronousSpeed::make(config.synchronous),
-              .meter = *MeasuredPower::make(config.meter),
-              .drive = *DriveModel::make(config.drive),
-              .friction = *LoadFriction::make(config.load_friction),
-              .tare = *IdleTare::make(config.tare),
-              .monitor = *SynthesizedMonitor::make(config.monitor)} {
-  const float speed_nm = blocks_.drive.gain(0.0F) * config.speed_sigma_rad_s;
-  settings_.speed_variance_nm2 = 2.0F * speed_nm * speed_nm;
+bool TorquePath::add(const Input& input) noexcept {
+  const MotorSample motor = input.motor_valid ? input.motor : MotorSample{};
+  add_speed(input.speed_valid ? input.speed_rad_s : 0.0F);
+  if (input.meter_valid) {
+    sums_.meter_w += input.power_meter_w;
+    ++sums_.meter_samples;
+  }
+  if (input.motor_valid) ++sums_.motor_samples;
+  if (input.speed_valid) ++sums_.speed_samples;
+  return add_motor({&motor, 1});
 }
 
 void TorquePath::restart() noexcept {

@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <expected>
 #include <optional>
+#include <span>
 #include <type_traits>
 
 #include "estimator/air_gap_power.hpp"
@@ -129,9 +130,10 @@ class TorquePath {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static std::expected<TorquePath, ConfigError> make(const Config& config) noexcept;
+  [[nodiscard]] static constexpr std::expected<TorquePath, ConfigError> make(
+      const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays.
-  [[nodiscard]] static TorquePath make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr TorquePath make_checked(const Config& config) noexcept {
     return TorquePath{config};
   }
 
@@ -141,7 +143,13 @@ class TorquePath {
     return close_window(input.feed);
   }
   // The same in two parts: true with the last sample of a window, which close_window() then ends.
-  [[nodiscard]] [[gnu::always_inline]] bool add(const Input& input) noexcept;
+  [[nodiscard]] bool add(const Input& input) noexcept;
+  // Samples of one window, at most samples_left() of them; `rows` are the same samples, each with
+  // speed_rad_s and power_meter_w, read where they are valid.
+  template <class Row>
+  [[nodiscard]] bool add_run(std::span<const MotorSample> motor, std::span<const Row> rows,
+                             bool speed_valid, bool meter_valid) noexcept;
+  [[nodiscard]] std::uint32_t samples_left() const noexcept { return blocks_.power.samples_left(); }
   [[nodiscard]] Output close_window(Feed feed) noexcept {
     Output output;
     close_window(feed, output);
@@ -187,7 +195,7 @@ class TorquePath {
   struct Load;    // what inertia and friction take
   struct Choice;  // which power, and its torque
 
-  explicit TorquePath(const Config& config) noexcept;
+  explicit constexpr TorquePath(const Config& config) noexcept;
 
   [[nodiscard]] Window window(const AirGapPower::Output& power,
                               const SynchronousSpeed::Output& synchronous) noexcept;
@@ -199,30 +207,67 @@ class TorquePath {
   void publish_torque(const Window& window, const Load& load, const Choice& chosen,
                       Output& output) noexcept;
 
+  [[nodiscard]] bool add_motor(std::span<const MotorSample> motor) noexcept;
+  void add_speed(float speed_rad_s) noexcept;
+
   // In this order for the short reach of a Cortex-M7's floats, see firmware/control_loop.hpp.
   Settings settings_;
   Sums sums_{};
   Blocks blocks_;
 };
 
-inline bool TorquePath::add(const Input& input) noexcept {
-  const MotorSample motor = input.motor_valid ? input.motor : MotorSample{};
-  const bool power_ends = blocks_.power.add(motor, sums_.electrical_rad_s);
-  const bool ends = blocks_.synchronous.add(motor) && power_ends;
-
-  // Trapezoid, as AirGapPower does.
-  const float speed = input.speed_valid ? input.speed_rad_s : 0.0F;
-  const float before = sums_.continued != 0 ? sums_.last_speed_rad_s : speed;
+// Trapezoid, as AirGapPower does.
+inline void TorquePath::add_speed(float speed_rad_s) noexcept {
+  const float before = sums_.continued != 0 ? sums_.last_speed_rad_s : speed_rad_s;
   sums_.continued = 1;
-  sums_.last_speed_rad_s = speed;
-  sums_.speed_rad_s += 0.5F * (before + speed);
-  if (input.meter_valid) {
-    sums_.meter_w += input.power_meter_w;
-    ++sums_.meter_samples;
+  sums_.last_speed_rad_s = speed_rad_s;
+  sums_.speed_rad_s += 0.5F * (before + speed_rad_s);
+}
+
+template <class Row>
+bool TorquePath::add_run(std::span<const MotorSample> motor, std::span<const Row> rows,
+                         bool speed_valid, bool meter_valid) noexcept {
+  for (const Row& row : rows) add_speed(speed_valid ? row.speed_rad_s : 0.0F);
+  const auto count = static_cast<std::uint32_t>(rows.size());
+  if (meter_valid) {
+    for (const Row& row : rows) sums_.meter_w += row.power_meter_w;
+    sums_.meter_samples += count;
   }
-  if (input.motor_valid) ++sums_.motor_samples;
-  if (input.speed_valid) ++sums_.speed_samples;
-  return ends;
+  sums_.motor_samples += count;
+  if (speed_valid) sums_.speed_samples += count;
+  return add_motor(motor);
+}
+
+constexpr auto TorquePath::make(const Config& config) noexcept
+    -> std::expected<TorquePath, ConfigError> {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return TorquePath{config};
+}
+
+constexpr TorquePath::TorquePath(const Config& config) noexcept
+    : settings_{.method = config.method,
+                .speed = config.speed,
+                .samples_per_window = config.power.samples_per_window,
+                .count = static_cast<float>(config.power.samples_per_window),
+                .pole_pairs = config.synchronous.pole_pairs,
+                .slip_ohm = 1.5F * config.synchronous.pole_pairs * config.synchronous.pole_pairs,
+                .loss_sigma_ohm = 1.5F * config.power.stator_resistance_ohm *
+                                  config.stator_resistance_sigma_ratio,
+                .speed_variance_nm2 = 0.0F,
+                .rotor_resistance_ohm = config.rotor_resistance_ohm,
+                .rated_torque_nm = config.rated_torque_nm,
+                .rated_slip_ratio = config.rated_slip_ratio,
+                .inertia_sigma_ratio = config.inertia_sigma_ratio,
+                .minimum_speed_rad_s = config.minimum_speed_rad_s},
+      blocks_{.power = *AirGapPower::make(config.power),
+              .synchronous = *SynchronousSpeed::make(config.synchronous),
+              .meter = *MeasuredPower::make(config.meter),
+              .drive = *DriveModel::make(config.drive),
+              .friction = *LoadFriction::make(config.load_friction),
+              .tare = *IdleTare::make(config.tare),
+              .monitor = *SynthesizedMonitor::make(config.monitor)} {
+  const float speed_nm = blocks_.drive.gain(0.0F) * config.speed_sigma_rad_s;
+  settings_.speed_variance_nm2 = 2.0F * speed_nm * speed_nm;
 }
 
 static_assert(std::is_trivially_copyable_v<TorquePath>);

@@ -13,107 +13,92 @@ using hal::can::identifier;
 constexpr std::int64_t kRateWindow_ns = 500'000'000;
 // A rate that is wrong in the machine file is wrong by a factor; the board's clock is jittery.
 constexpr float kRateTolerance_ratio = 0.1F;
-constexpr float kTurning_rad_s = 1.0F;         // slower is standing still, and noise
-constexpr std::int64_t kMostClockSteps = 100;  // after a stall; the rest of the time is forgotten
+constexpr float kTurning_rad_s = 1.0F;  // slower is standing still, and noise
+constexpr int kMostClockSteps = 100;    // after a stall; the rest of the time is forgotten
 
 // Two voltages of three sum to minus the third: exactly between the lines, and to the neutral of a
 // motor with three wires but for what drives no current.
-hal::Sample with_third_phase(hal::Sample sample) noexcept {
+void add_third_phase(hal::Sample& sample) noexcept {
   using hal::Signal;
-  if (!sample.has(Signal::kVoltageW) && sample.has(Signal::kVoltageU) &&
-      sample.has(Signal::kVoltageV)) {
-    sample.voltage_v[2] = -(sample.voltage_v[0] + sample.voltage_v[1]);
-    sample.present |= hal::bit(Signal::kVoltageW);
-  }
-  return sample;
+  constexpr std::uint32_t kTwo = hal::bit(Signal::kVoltageU) | hal::bit(Signal::kVoltageV);
+  constexpr std::uint32_t kThird = hal::bit(Signal::kVoltageW);
+  if ((sample.present & (kTwo | kThird)) != kTwo) return;
+  sample.voltage_v[2] = -(sample.voltage_v[0] + sample.voltage_v[1]);
+  sample.present |= kThird;
 }
 
 }  // namespace
-
-Board::Board(const Config& config) noexcept
-    : config_{.samples_by_can = config.samples_by_can,
-              .node = config.node,
-              .code = config.loop.controller.code,
-              .supervisor_period_s = config.supervisor.period_s,
-              .force_reference_n = config.force_reference_n,
-              .force_limit_n = config.force_limit_n,
-              .sample_period_ns = config.sample_period_ns},
-      loop_(ControlLoop::make_checked(config.loop)),
-      supervisor_(*Supervisor::make(config.supervisor)),
-      assembler_(*hal::can::SampleAssembler::make(config.assembler)),
-      link_(config.node),
-      report_(config.node) {
-  supervision_.override_pct = loop_.command().override_pct;
-}
-
-auto Board::Config::check() const noexcept -> std::expected<void, ConfigError> {
-  if (!loop.check()) return std::unexpected{ConfigError::kLoop};
-  if (!supervisor.check()) return std::unexpected{ConfigError::kSupervisor};
-  if (!assembler.check() || sample_period_ns <= 0) return std::unexpected{ConfigError::kAssembler};
-  if (node < 1 || node > 127) return std::unexpected{ConfigError::kNode};
-  const bool limited = force_limit_n > 0.0F;
-  if (!(force_limit_n >= 0.0F) || (limited && !(force_limit_n > force_reference_n)))
-    return std::unexpected{ConfigError::kForceLimit};
-  return {};
-}
 
 auto Board::make(const Config& config) noexcept -> std::expected<Board, ConfigError> {
   if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
   return Board{config};
 }
 
+// Apart, so that the frame's values are not on the stack below the loop.
+[[gnu::noinline]] auto Board::sample_in(const hal::can::Frame& frame, std::int64_t now_ns) noexcept
+    -> std::optional<hal::Sample> {
+  const auto phases = hal::can::unpack<hal::can::Phases>(frame);
+  return phases ? assembler_.take(*phases, now_ns) : std::nullopt;
+}
+
 auto Board::receive(const hal::can::Frame& frame, std::int64_t now_ns) noexcept
-    -> std::optional<LoopOutput> {
+    -> const LoopOutput* {
   if (config_.samples_by_can && !frame.own) {
     if (frame.id == identifier(Base::kPhases, config_.node)) {
-      const auto phases = hal::can::unpack<hal::can::Phases>(frame);
-      const auto taken = phases ? assembler_.take(*phases, now_ns) : std::nullopt;
-      if (!taken) return std::nullopt;
-      return run_loop(*taken, now_ns);
+      auto taken = sample_in(frame, now_ns);
+      if (!taken) return nullptr;
+      complete({&*taken, 1}, now_ns);
+      std::span<const hal::Sample> one(&*taken, 1);
+      return step(one, now_ns);
     }
     if (frame.id == identifier(Base::kSpindle, config_.node)) {
       if (const auto spindle = hal::can::unpack<hal::can::Spindle>(frame))
         assembler_.take(*spindle);
-      return std::nullopt;
+      return nullptr;
     }
   }
   link_.take(frame);
-  return std::nullopt;
+  return nullptr;
 }
 
-auto Board::sample(const hal::Sample& sample, std::int64_t now_ns) noexcept
-    -> std::optional<LoopOutput> {
-  return run_loop(with_third_phase(sample), now_ns);
+// What the bus and the board know of the samples, into each of them.
+void Board::complete(std::span<hal::Sample> samples, std::int64_t now_ns) noexcept {
+  note_rate(static_cast<std::uint32_t>(samples.size()), now_ns);
+  for (hal::Sample& sample : samples) {
+    add_third_phase(sample);
+    note_turning(sample);
+  }
+  link_.add_to(samples);
 }
 
-auto Board::run_loop(hal::Sample sample, std::int64_t now_ns) noexcept
-    -> std::optional<LoopOutput> {
-  note_rate(now_ns);
-  note_turning(sample);
-  link_.add_to(sample);
+auto Board::step(std::span<const hal::Sample>& samples, std::int64_t now_ns) noexcept
+    -> const LoopOutput* {
   loop_.permit(permission());
-  std::optional<LoopOutput> output = loop_.step(sample);
-  if (!output) return std::nullopt;
+  const std::optional<LoopOutput> output = loop_.step(samples);
+  if (!output) return nullptr;
   own_.supervised_ns = std::max(own_.supervised_ns, now_ns);
   note_wear(*output);
   supervise(&*output);
-  output->override_pct = static_cast<float>(supervision_.override_pct);
-  output->present |= LoopOutput::kOverride;
   own_.last = *output;
-  return output;
+  own_.last.override_pct = static_cast<float>(supervision_.override_pct);
+  own_.last.present |= LoopOutput::kOverride;
+  return &own_.last;
 }
 
 // The rate by the board's own clock, over windows; what is not a whole window says nothing.
-void Board::note_rate(std::int64_t now_ns) noexcept {
-  ++own_.rate_count;
+void Board::note_rate(std::uint32_t count, std::int64_t now_ns) noexcept {
   const std::int64_t window_ns = now_ns - own_.rate_since_ns;
-  if (own_.rate_since_ns != 0 && window_ns < kRateWindow_ns) return;
+  if (own_.rate_since_ns != 0 && window_ns < kRateWindow_ns) {
+    own_.rate_count += count;
+    return;
+  }
   // The sample that opens a window is not in it.
+  const std::uint32_t counted = own_.rate_count + 1;
   own_.rate_hz = own_.rate_since_ns != 0 && window_ns < 2 * kRateWindow_ns
-                     ? static_cast<float>(own_.rate_count) * 1e9F / static_cast<float>(window_ns)
+                     ? static_cast<float>(counted) * 1e9F / static_cast<float>(window_ns)
                      : 0.0F;
   own_.rate_since_ns = now_ns;
-  own_.rate_count = 0;
+  own_.rate_count = count - 1;
 }
 
 void Board::note_wear(const LoopOutput& output) noexcept {
@@ -165,7 +150,7 @@ bool Board::checks_done() const noexcept {
 
 bool Board::checks_passed() const noexcept {
   if (!own_.health.ports_open || (own_.health.has_bus && is_down(own_.health.bus))) return false;
-  const float expected_hz = 1e9F / static_cast<float>(config_.sample_period_ns);
+  const float expected_hz = config_.sample_rate_hz;
   return own_.rate_hz > (1.0F - kRateTolerance_ratio) * expected_hz &&
          own_.rate_hz < (1.0F + kRateTolerance_ratio) * expected_hz;
 }
@@ -256,12 +241,12 @@ auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> Boa
     own_.started = 1;
     own_.supervised_ns = own_.began_ns = own_.now_ns = now_ns;
   }
-  const auto step_ns = static_cast<std::int64_t>(config_.supervisor_period_s * 1e9F + 0.5F);
   if (at_once) supervise(nullptr);
-  if (now_ns - own_.supervised_ns > kSilence_ns) {
-    std::int64_t steps = (now_ns - own_.supervised_ns - kSilence_ns) / step_ns;
-    own_.supervised_ns += steps * step_ns;
-    for (steps = std::min(steps, kMostClockSteps); steps > 0; --steps) supervise(nullptr);
+  std::int64_t behind_ns = now_ns - own_.supervised_ns - kSilence_ns;
+  for (int steps = 0; behind_ns >= config_.supervisor_step_ns; ++steps) {
+    behind_ns = steps < kMostClockSteps ? behind_ns - config_.supervisor_step_ns : 0;
+    own_.supervised_ns = now_ns - kSilence_ns - behind_ns;
+    if (steps < kMostClockSteps) supervise(nullptr);
   }
   own_.now_ns = now_ns;
 

@@ -16,6 +16,7 @@
 #include <cstdint>
 #include <expected>
 #include <optional>
+#include <span>
 #include <type_traits>
 
 #include "control/override_code.hpp"
@@ -64,7 +65,7 @@ class Board {
     float force_limit_n;  // above the reference; 0: none
     std::int64_t sample_period_ns;
 
-    [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
   };
 
   // Without a sample for so long, the clock goes on for them.
@@ -77,7 +78,9 @@ class Board {
   // above the reference.
   [[nodiscard]] static std::expected<Board, ConfigError> make(const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays: 10 kB do not pass over a small stack.
-  [[nodiscard]] static Board make_checked(const Config& config) noexcept { return Board{config}; }
+  [[nodiscard]] static constexpr Board make_checked(const Config& config) noexcept {
+    return Board{config};
+  }
 
   // On a bus where nobody answers, nothing is heard of the board either.
   [[nodiscard]] static constexpr bool is_down(const hal::BusStatus& bus) noexcept {
@@ -85,12 +88,20 @@ class Board {
            !bus.acknowledged;
   }
 
-  // A frame that came at `now_ns`; a row of the trace where it ended an estimate period.
-  [[nodiscard]] std::optional<LoopOutput> receive(const hal::can::Frame& frame,
-                                                  std::int64_t now_ns) noexcept;
-  // A sample from elsewhere than the bus.
-  [[nodiscard]] std::optional<LoopOutput> sample(const hal::Sample& sample,
-                                                 std::int64_t now_ns) noexcept;
+  // A frame that came at `now_ns`; a row of the trace where it ended an estimate period, else a
+  // null pointer. The row stays until the next one.
+  [[nodiscard]] const LoopOutput* receive(const hal::can::Frame& frame,
+                                          std::int64_t now_ns) noexcept;
+  // Samples from elsewhere than the bus, as they lie in the caller's block: what the CNC says is
+  // written into them. `sink` sees each row of the trace.
+  template <class Sink>
+  void samples(std::span<hal::Sample> samples, std::int64_t now_ns, Sink& sink) noexcept {
+    if (samples.empty()) return;
+    complete(samples, now_ns);
+    for (std::span<const hal::Sample> rest = samples; !rest.empty();) {
+      if (const auto row = step(rest, now_ns)) sink(*row);
+    }
+  }
   // After all that has come since the last tick. `now_ns` does not go back.
   [[nodiscard]] BoardOutput tick(std::int64_t now_ns, const BoardHealth& health) noexcept;
 
@@ -131,12 +142,15 @@ class Board {
     BoardHealth health{};
   };
 
-  explicit Board(const Config& config) noexcept;
+  explicit constexpr Board(const Config& config) noexcept;
 
-  [[nodiscard]] std::optional<LoopOutput> run_loop(hal::Sample sample,
-                                                   std::int64_t now_ns) noexcept;
+  [[nodiscard]] std::optional<hal::Sample> sample_in(const hal::can::Frame& frame,
+                                                     std::int64_t now_ns) noexcept;
+  void complete(std::span<hal::Sample> samples, std::int64_t now_ns) noexcept;
+  [[nodiscard]] const LoopOutput* step(std::span<const hal::Sample>& samples,
+                                       std::int64_t now_ns) noexcept;
   void supervise(const LoopOutput* output) noexcept;
-  void note_rate(std::int64_t now_ns) noexcept;
+  void note_rate(std::uint32_t count, std::int64_t now_ns) noexcept;
   void note_wear(const LoopOutput& output) noexcept;
   void note_turning(const hal::Sample& sample) noexcept;
   void note_foreign() noexcept;
@@ -156,7 +170,8 @@ class Board {
     float supervisor_period_s;
     float force_reference_n;
     float force_limit_n;
-    std::int64_t sample_period_ns;
+    float sample_rate_hz;
+    std::int64_t supervisor_step_ns;
   };
 
   Settings config_;
@@ -168,6 +183,35 @@ class Board {
   control::Supervisor::Output supervision_{};
   Own own_{};
 };
+constexpr Board::Board(const Config& config) noexcept
+    : config_{.samples_by_can = config.samples_by_can,
+              .node = config.node,
+              .code = config.loop.controller.code,
+              .supervisor_period_s = config.supervisor.period_s,
+              .force_reference_n = config.force_reference_n,
+              .force_limit_n = config.force_limit_n,
+              .sample_rate_hz = 1e9F / static_cast<float>(config.sample_period_ns),
+              .supervisor_step_ns =
+                  static_cast<std::int64_t>(config.supervisor.period_s * 1e9F + 0.5F)},
+      loop_(ControlLoop::make_checked(config.loop)),
+      supervisor_(*control::Supervisor::make(config.supervisor)),
+      assembler_(*hal::can::SampleAssembler::make(config.assembler)),
+      link_(config.node),
+      report_(config.node) {
+  supervision_.override_pct = loop_.command().override_pct;
+}
+
+constexpr auto Board::Config::check() const noexcept -> std::expected<void, ConfigError> {
+  if (!loop.check()) return std::unexpected{ConfigError::kLoop};
+  if (!supervisor.check()) return std::unexpected{ConfigError::kSupervisor};
+  if (!assembler.check() || sample_period_ns <= 0) return std::unexpected{ConfigError::kAssembler};
+  if (node < 1 || node > 127) return std::unexpected{ConfigError::kNode};
+  const bool limited = force_limit_n > 0.0F;
+  if (!(force_limit_n >= 0.0F) || (limited && !(force_limit_n > force_reference_n)))
+    return std::unexpected{ConfigError::kForceLimit};
+  return {};
+}
+
 static_assert(std::is_trivially_copyable_v<Board>);
 
 }  // namespace cutforce::firmware

@@ -56,7 +56,7 @@ class BoardReport {
     std::uint32_t offered_reason;
   };
 
-  explicit BoardReport(std::uint8_t node) noexcept : node_(node) {}
+  explicit constexpr BoardReport(std::uint8_t node) noexcept : node_(node) {}
 
   // The frame to send now, if one is due. `now_ns` does not go back.
   [[nodiscard]] std::optional<hal::can::Frame> due(std::int64_t now_ns,

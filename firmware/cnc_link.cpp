@@ -23,9 +23,12 @@ void take_guarded(const hal::can::Frame& frame, hal::can::GuardReceiver& guard,
   is_new = true;
 }
 
-void set(hal::Sample& sample, Signal signal, float hal::Sample::*member, float value) noexcept {
-  sample.*member = value;
-  sample.present |= hal::bit(signal);
+void set(std::span<hal::Sample> samples, Signal signal, float hal::Sample::*member,
+         float value) noexcept {
+  for (hal::Sample& sample : samples) {
+    sample.*member = value;
+    sample.present |= hal::bit(signal);
+  }
 }
 
 }  // namespace
@@ -62,20 +65,21 @@ void CncLink::forget() noexcept {
   state_.foreign = false;
 }
 
-void CncLink::add_to(hal::Sample& sample) const noexcept {
+void CncLink::add_to(std::span<hal::Sample> samples) const noexcept {
   if (state_.machine) {
     const hal::can::MachineState& machine = *state_.machine;
     const bool cutting = machine.cutting_feed && !machine.rapid;
-    set(sample, Signal::kFeedActive, &hal::Sample::feed_active, cutting ? 1.0F : 0.0F);
-    set(sample, Signal::kPartStart, &hal::Sample::part_start, machine.part_start ? 1.0F : 0.0F);
+    set(samples, Signal::kFeedActive, &hal::Sample::feed_active, cutting ? 1.0F : 0.0F);
+    set(samples, Signal::kPartStart, &hal::Sample::part_start, machine.part_start ? 1.0F : 0.0F);
     if (machine.override_applied_pct) {
-      set(sample, Signal::kOverrideApplied, &hal::Sample::override_applied_pct,
+      set(samples, Signal::kOverrideApplied, &hal::Sample::override_applied_pct,
           static_cast<float>(*machine.override_applied_pct));
     }
-    if (machine.feed_m_s) set(sample, Signal::kFeedRate, &hal::Sample::feed_m_s, *machine.feed_m_s);
+    if (machine.feed_m_s)
+      set(samples, Signal::kFeedRate, &hal::Sample::feed_m_s, *machine.feed_m_s);
   }
   if (state_.job && state_.job->diameter_m) {
-    set(sample, Signal::kWorkpieceDiameter, &hal::Sample::workpiece_diameter_m,
+    set(samples, Signal::kWorkpieceDiameter, &hal::Sample::workpiece_diameter_m,
         *state_.job->diameter_m);
   }
 }

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <type_traits>
 
 #include "hal/can/guard.hpp"
@@ -25,7 +26,7 @@ class CncLink {
     bool foreign = false;       // a frame with our identifiers since the last fetch_foreign()
   };
 
-  explicit CncLink(std::uint8_t node) noexcept : node_(node) {}
+  explicit constexpr CncLink(std::uint8_t node) noexcept : node_(node) {}
 
   void take(const hal::can::Frame& frame) noexcept;
 
@@ -37,7 +38,7 @@ class CncLink {
   void forget() noexcept;
 
   // What the CNC knows better than the sampled signals: feed, applied override, diameter, part.
-  void add_to(hal::Sample& sample) const noexcept;
+  void add_to(std::span<hal::Sample> samples) const noexcept;
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
   void restore(const State& state) noexcept { state_ = state; }

@@ -28,6 +28,7 @@
 #include "estimator/torque_path.hpp"
 #include "firmware/loop_output.hpp"
 #include "firmware/machine.hpp"
+#include "firmware/sample_run.hpp"
 #include "hal/port.hpp"
 
 namespace cutforce::firmware {
@@ -70,7 +71,7 @@ class ControlLoop {
     estimator::CuttingForce::Config force;
     control::ControlPath::Config controller;
 
-    [[nodiscard]] std::expected<void, ConfigError> check() const noexcept;
+    [[nodiscard]] constexpr std::expected<void, ConfigError> check() const noexcept;
   };
 
   // What the loop itself keeps between samples.
@@ -127,15 +128,22 @@ class ControlLoop {
   // Fails iff check() does.
   [[nodiscard]] static std::expected<ControlLoop, ConfigError> make(const Config& config) noexcept;
   // Of a config that check() accepts, made where it stays: 9 kB do not pass over a small stack.
-  [[nodiscard]] static ControlLoop make_checked(const Config& config) noexcept {
+  [[nodiscard]] static constexpr ControlLoop make_checked(const Config& config) noexcept {
     return ControlLoop{config};
   }
 
-  // One raw sample; an output with the sample that ends an estimate period.
-  [[nodiscard]] std::optional<LoopOutput> step(const hal::Sample& sample) noexcept;
+  // Raw samples from the front of `samples`, until one ends an estimate period or there are no
+  // more; those that were taken are no longer in it. An output with the sample that ends a period.
+  // What comes out is the same however the samples are cut into spans.
+  [[nodiscard]] std::optional<LoopOutput> step(std::span<const hal::Sample>& samples) noexcept;
+  // One of them.
+  [[nodiscard]] std::optional<LoopOutput> step(const hal::Sample& sample) noexcept {
+    std::span<const hal::Sample> one(&sample, 1);
+    return step(one);
+  }
 
   // Of the last control tick; before the first, the neutral override.
-  [[nodiscard]] const hal::Command& command() const noexcept { return command_; }
+  [[nodiscard]] constexpr const hal::Command& command() const noexcept { return command_; }
 
   // Puts another law in charge from the next control tick on (control/law_set.hpp).
   void select(control::LawName name) noexcept { controller_.select(name); }
@@ -148,7 +156,7 @@ class ControlLoop {
   void restore(const State& state) noexcept;
 
  private:
-  explicit ControlLoop(const Config& config) noexcept;
+  explicit constexpr ControlLoop(const Config& config) noexcept;
 
   static constexpr std::uint32_t kCommands =
       hal::bit(hal::Signal::kMeasuredForce) | hal::bit(hal::Signal::kFeedActive) |
@@ -156,24 +164,18 @@ class ControlLoop {
       hal::bit(hal::Signal::kEnable) | hal::bit(hal::Signal::kPartStart);
 
   void restart() noexcept;
-  // A sample that the gate let through.
-  struct Passed {
-    float elapsed_periods;
-    float counted_periods;  // towards the estimate window
-    std::uint32_t at_end_channels;
-    std::uint32_t present;  // of SampleGate
-  };
-  [[nodiscard]] std::optional<LoopOutput> step_carefully(const hal::Sample& sample,
-                                                         std::uint32_t present) noexcept;
-  [[nodiscard]] std::optional<LoopOutput> go_on(const hal::Sample& sample,
-                                                const estimator::SampleGate::Values& values,
-                                                const Passed& passed) noexcept;
-  void estimate_from(const estimator::MotorSample& motor,
-                     const estimator::SampleGate::Values& values, const Passed& passed) noexcept;
-  void note_commands(const hal::Sample& sample) noexcept;
+  [[nodiscard]] std::size_t step_run(std::span<const hal::Sample> samples) noexcept;
+  [[nodiscard]] std::size_t longest_run(std::size_t samples) const noexcept;
+  void pass_run(std::span<const hal::Sample> samples, const SampleRun& run) noexcept;
+  void step_alone(const hal::Sample& sample) noexcept;
+  void estimate_alone(const estimator::MotorSample& motor,
+                      const estimator::SampleGate::Output& gated) noexcept;
+  void note_commands(std::span<const hal::Sample> samples) noexcept;
+  void note_part_start(const hal::Sample& sample) noexcept;
   void close_path() noexcept;
   void note_speed(float sum_rad_s, std::uint32_t count) noexcept;
-  void calibrate_from(const estimator::SampleGate::Values& values) noexcept;
+  void calibrate_from(const std::array<float, 3>& voltage_v,
+                      const std::array<float, 3>& current_a) noexcept;
   [[nodiscard]] std::int64_t time_ns() const noexcept { return gate_.state().last_time_ns; }
   [[nodiscard]] float speed_rad_s() const noexcept { return gate_.values().speed_rad_s; }
   [[nodiscard]] bool speed_present() const noexcept {
@@ -238,17 +240,18 @@ template <hal::Port P, class Sink>
     const auto count = port.read(block);
     if (!count) return std::unexpected{count.error()};
     if (*count == 0) return {};
-    for (const hal::Sample& sample : block.first(*count)) {
-      if (const std::optional<LoopOutput> out = loop.step(sample); out) {
-        sink(*out);
-        if (out->control_tick) {
-          if (const auto sent = port.write(loop.command()); !sent) {
-            return std::unexpected{sent.error()};
-          }
-        }
+    for (std::span<const hal::Sample> rest = block.first(*count); !rest.empty();) {
+      const std::optional<LoopOutput> out = loop.step(rest);
+      if (!out) continue;
+      sink(*out);
+      if (!out->control_tick) continue;
+      if (const auto sent = port.write(loop.command()); !sent) {
+        return std::unexpected{sent.error()};
       }
     }
   }
 }
 
 }  // namespace cutforce::firmware
+
+#include "firmware/control_loop_make.hpp"  // IWYU pragma: export

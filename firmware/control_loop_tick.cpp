@@ -1,3 +1,4 @@
+#include "estimator/polynomials.hpp"
 #include "firmware/control_loop.hpp"
 #include "firmware/spindle_ratio.hpp"
 
@@ -13,28 +14,39 @@ constexpr float kDiameterMost_m = 1e3F;
 
 }  // namespace
 
-void ControlLoop::note_commands(const hal::Sample& sample) noexcept {
-  own_.commands_present = sample.present & kCommands;
-  if (sample.has(Signal::kFeedActive)) {
+// Of samples that carry the same. What says how things stand counts as the last of them has it.
+void ControlLoop::note_commands(std::span<const hal::Sample> samples) noexcept {
+  const hal::Sample& last = samples.back();
+  own_.commands_present = last.present & kCommands;
+  if (last.has(Signal::kFeedActive)) {
     // An active feed may still be the approach: contact is told from the torque then.
-    own_.feed = sample.feed_active <= 0.5F ? 1U : 0U;  // NaN: not known
+    own_.feed = last.feed_active <= 0.5F ? 1U : 0U;  // NaN: not known
   }
-  if (sample.has(Signal::kWorkpieceDiameter)) {
-    const float diameter_m = sample.workpiece_diameter_m;
+  if (last.has(Signal::kWorkpieceDiameter)) {
+    const float diameter_m = last.workpiece_diameter_m;
     own_.diameter_m = diameter_m > 0.0F && diameter_m < kDiameterMost_m ? diameter_m : 0.0F;
   }
-  // A start that is held is still one start.
+  if (last.has(Signal::kEnable)) own_.enabled = last.enable > 0.5F ? 1U : 0U;
+  own_.override_reported = last.has(Signal::kOverrideApplied) ? 1U : 0U;
+  own_.override_reported_pct = last.override_applied_pct;
+  if (last.has(Signal::kPartStart) || own_.part_signal != 0) {
+    for (const hal::Sample& sample : samples) note_part_start(sample);
+  }
+  if (config_.estimator != EstimatorName::kDynamometer) return;
+  for (const hal::Sample& sample : samples) {
+    const float force_n = sample.measured_force_n;
+    if (!sample.has(Signal::kMeasuredForce) || !(estimator::magnitude(force_n) < kForceMost_n))
+      continue;
+    own_.dynamometer_n += force_n;
+    ++own_.dynamometer_count;
+  }
+}
+
+// A start that is held is still one start.
+void ControlLoop::note_part_start(const hal::Sample& sample) noexcept {
   const bool part = sample.has(Signal::kPartStart) && sample.part_start > 0.5F;
   if (part && own_.part_signal == 0) own_.part_start = 1;
   own_.part_signal = part ? 1U : 0U;
-  if (sample.has(Signal::kEnable)) own_.enabled = sample.enable > 0.5F ? 1U : 0U;
-  own_.override_reported = sample.has(Signal::kOverrideApplied) ? 1U : 0U;
-  own_.override_reported_pct = sample.override_applied_pct;
-  if (sample.has(Signal::kMeasuredForce) && sample.measured_force_n < kForceMost_n &&
-      sample.measured_force_n > -kForceMost_n) {
-    own_.dynamometer_n += sample.measured_force_n;
-    ++own_.dynamometer_count;
-  }
 }
 
 void ControlLoop::permit(const control::Permission& permission) noexcept {

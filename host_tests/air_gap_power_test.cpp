@@ -2,12 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <random>
+#include <vector>
 
 #include "support/allocation_count.hpp"
+#include "support/same_bits.hpp"
 
 namespace cutforce::host_tests {
 namespace {
@@ -188,6 +193,38 @@ TEST(AirGapPower, DoesNotDependOnTheFrame) {
          .electrical_rad_s = 0.0F});
     if (a) {
       EXPECT_NEAR(a->airgap_power_w, b->airgap_power_w, 0.05F);
+    }
+  }
+}
+
+TEST(AirGapPower, GivesTheSameInRunsAsSampleBySample) {
+  std::mt19937 random(19);
+  for (const auto mode : {AirGapPower::Mode::kDotProduct, AirGapPower::Mode::kFixedPowerFactor}) {
+    for (const auto window :
+         {AirGapPower::Window::kTime, AirGapPower::Window::kElectricalPeriods}) {
+      auto config = kConfig;
+      config.mode = mode;
+      config.window = window;
+      auto singly = AirGapPower::make(config).value();
+      auto in_runs = singly;
+      int windows = 0;
+      for (int k = 0; k < 5000;) {
+        const std::uint32_t left = in_runs.samples_left();
+        ASSERT_GT(left, 0U);
+        std::vector<MotorSample> run(std::min<std::size_t>(1 + random() % 8, left));
+        bool ends = false;
+        for (MotorSample& sample : run) {
+          ASSERT_FALSE(ends) << k;
+          sample = sinusoid(k++ * 1e-3, 46.0, 0.5, 0.3);
+          ends = singly.add(sample, 289.0F);
+        }
+        ASSERT_EQ(in_runs.add_run(run, 289.0F), ends) << k;
+        ASSERT_TRUE(same_bits(singly.state(), in_runs.state())) << k;
+        if (!ends) continue;
+        ++windows;
+        ASSERT_TRUE(same_bits(singly.close_window(), in_runs.close_window())) << k;
+      }
+      EXPECT_GT(windows, 10);
     }
   }
 }

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstring>
 #include <random>
+#include <vector>
 
 #include "firmware/configuration_board.hpp"
 #include "hal/can/guard.hpp"
@@ -212,6 +213,41 @@ TEST(Board, TakesNoHarmFromAnyFrame) {
     ASSERT_NE(out.supervision.state, SupervisorState::kControl) << k;
   }
   EXPECT_EQ(allocation_count(), before);
+}
+
+// A converter's DMA delivers blocks; their length is nobody's business but the converter's.
+TEST(Board, TakesABlockAsItsSamplesOneByOne) {
+  const auto recorded = committed_recording("entry_cut");
+  const auto board = firmware::make_board(recorded.machine, {.node = 1,
+                                                             .samples_by_can = false,
+                                                             .voltage_full_scale_v = 400.0F,
+                                                             .current_full_scale_a = 100.0F});
+  ASSERT_TRUE(board);
+  Board singly = *board;
+  Board in_blocks = *board;
+  std::vector<firmware::LoopOutput> expected;
+  std::vector<firmware::LoopOutput> got;
+  const auto expect = [&](const firmware::LoopOutput& row) { expected.push_back(row); };
+  const auto get = [&](const firmware::LoopOutput& row) { got.push_back(row); };
+  std::mt19937 random(29);
+  std::int64_t now_ns = kTick_ns;
+  for (std::size_t at = 0; at < recorded.samples.size(); now_ns += kTick_ns) {
+    const std::size_t count = std::min<std::size_t>(random() % 12, recorded.samples.size() - at);
+    std::vector<hal::Sample> block(
+        recorded.samples.begin() + static_cast<std::ptrdiff_t>(at),
+        recorded.samples.begin() + static_cast<std::ptrdiff_t>(at + count));
+    for (hal::Sample sample : block) singly.samples({&sample, 1}, now_ns, expect);
+    in_blocks.samples(block, now_ns, get);
+    at += count;
+    ASSERT_EQ(got.size(), expected.size());
+    const auto a = singly.tick(now_ns, well());
+    const auto b = in_blocks.tick(now_ns, well());
+    ASSERT_EQ(a.supervision.state, b.supervision.state) << at;
+    ASSERT_EQ(a.byte.byte, b.byte.byte) << at;
+  }
+  ASSERT_GT(got.size(), 1000U);
+  for (std::size_t k = 0; k < got.size(); ++k) ASSERT_EQ(bytes_of(got[k]), bytes_of(expected[k]));
+  EXPECT_FLOAT_EQ(singly.measured_rate_hz(), in_blocks.measured_rate_hz());
 }
 
 TEST(Board, ContinuesFromACopyBitForBit) {

@@ -6,7 +6,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
+#include <iterator>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "firmware/control_loop.hpp"
@@ -140,6 +143,42 @@ TEST(ControlLoop, StaysFiniteAndWithinItsLimitsWhateverComesIn) {
     EXPECT_GT(outputs, 5000);
     // Else the loop was never at work, and the test means little.
     EXPECT_GT(estimates, outputs / 4) << static_cast<int>(estimator);
+  }
+}
+
+// However the samples are cut into spans, among bad ones too, the outputs have the same bits.
+TEST(ControlLoop, GivesTheSameForSpansOfAnyLength) {
+  const auto recorded = committed_recording("entry_cut");
+  for (const EstimatorName estimator : kEveryEstimator) {
+    SCOPED_TRACE(static_cast<int>(estimator));
+    auto singly = make_loop(with_estimator(recorded.machine, estimator)).value();
+    auto in_spans = singly;
+    Vandal vandal(recorded.samples, 23 + static_cast<unsigned>(estimator));
+    std::mt19937 random(5);
+    std::size_t outputs = 0;
+    for (int block = 0; block < 6'000; ++block) {
+      std::vector<Sample> samples;
+      std::generate_n(std::back_inserter(samples), random() % 23, [&] { return vandal.next(); });
+      std::vector<LoopOutput> expected;
+      for (const Sample& sample : samples)
+        if (const auto output = singly.step(sample)) expected.push_back(*output);
+      std::vector<LoopOutput> got;
+      for (std::span<const Sample> rest = samples; !rest.empty();) {
+        const std::size_t before = rest.size();
+        if (const auto output = in_spans.step(rest)) got.push_back(*output);
+        ASSERT_LT(rest.size(), before);
+      }
+      ASSERT_EQ(got.size(), expected.size()) << block;
+      for (std::size_t k = 0; k < got.size(); ++k)
+        ASSERT_EQ(bytes_of(got[k]), bytes_of(expected[k])) << block;
+      outputs += got.size();
+    }
+    EXPECT_GT(outputs, 3000);
+    const auto a = singly.state();
+    const auto b = in_spans.state();
+    EXPECT_EQ(std::memcmp(&a.fused, &b.fused, sizeof a.fused), 0);
+    EXPECT_EQ(std::memcmp(&a.path, &b.path, sizeof a.path), 0);
+    EXPECT_EQ(std::memcmp(&a.health, &b.health, sizeof a.health), 0);
   }
 }
 

@@ -248,6 +248,28 @@ TEST(FluxTorque, StaysBoundedUnderRandomSignalsAndFrequencies) {
   }
 }
 
+TEST(FluxTorque, GivesTheSameInRunsAsSampleBySample) {
+  std::mt19937 random(17);
+  std::uniform_real_distribution<float> draw(-1.0F, 1.0F);
+  auto singly = FluxTorque::make(config_at(5000.0)).value();
+  auto in_runs = singly;
+  for (int run = 0; run < 5000; ++run) {
+    std::vector<MotorSample> samples(random() % 9);
+    for (MotorSample& sample : samples) {
+      sample = {.voltage_v = {600.0F * draw(random), 600.0F * draw(random)},
+                .current_a = {50.0F * draw(random), 50.0F * draw(random)}};
+      singly.step(sample, 1.0F);
+    }
+    in_runs.step_run(samples);
+    ASSERT_TRUE(same_bits(singly.state(), in_runs.state())) << run;
+    if (run % 3 != 0) continue;
+    ASSERT_TRUE(same_bits(singly.take(), in_runs.take())) << run;
+    const float frequency_rad_s = 600.0F * draw(random);
+    singly.set_frequency(frequency_rad_s);
+    in_runs.set_frequency(frequency_rad_s);
+  }
+}
+
 TEST(FluxTorque, ContinuesBitExactlyFromASnapshotWithoutAllocating) {
   const Steady motor{.frequency_rad_s = 314.159};
   auto original = FluxTorque::make(config_at(5000.0)).value();

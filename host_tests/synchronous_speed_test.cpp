@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <complex>
@@ -10,6 +11,7 @@
 #include <random>
 
 #include "support/allocation_count.hpp"
+#include "support/same_bits.hpp"
 
 namespace cutforce::host_tests {
 namespace {
@@ -145,6 +147,31 @@ TEST(SynchronousSpeed, RefusesWhatItCannotWorkWith) {
   EXPECT_EQ(refused([](auto& c) { c.flux_leak_rad_s = 0.0F; }), Error::kLeak);
   EXPECT_EQ(refused([](auto& c) { c.flux_leak_rad_s = 2000.0F; }), Error::kLeak);
   EXPECT_EQ(refused([](auto& c) { c.minimum_electrical_rad_s = 0.0F; }), Error::kLimits);
+}
+
+TEST(SynchronousSpeed, GivesTheSameInRunsAsSampleBySample) {
+  for (const auto vector : {SynchronousSpeed::Vector::kFlux, SynchronousSpeed::Vector::kCurrent}) {
+    const auto config = config_at(1000.0F, vector);
+    auto singly = SynchronousSpeed::make(config).value();
+    auto in_runs = singly;
+    for (int k = 0; k < 5000;) {
+      std::array<MotorSample, 5> run{};  // of 50 samples a window
+      bool ends = false;
+      for (MotorSample& sample : run) {
+        sample = steady(k * 1e-3, 200.0, 2.0 + 1e-4 * k);
+        ++k;
+        ends = singly.add(sample);
+      }
+      ASSERT_EQ(in_runs.add_run(run), ends) << k;
+      if (ends) {
+        const auto a = singly.close_window();
+        const auto b = in_runs.close_window();
+        ASSERT_TRUE(same_bits(a.electrical_rad_s, b.electrical_rad_s)) << k;
+        ASSERT_TRUE(same_bits(a.flux_square_v2s2, b.flux_square_v2s2)) << k;
+      }
+      ASSERT_TRUE(same_bits(singly.state(), in_runs.state())) << k;
+    }
+  }
 }
 
 TEST(SynchronousSpeed, ContinuesBitExactlyFromASnapshotWithoutAllocating) {

@@ -3,7 +3,7 @@
 #   cortex-m7   double-precision FPU   mps2-an500
 #   cortex-m4   single-precision FPU   mps2-an386
 #   cortex-m33  single-precision FPU   mps2-an505, secure side
-# Never -Os: Eigen becomes six times slower with it and pulls in free().
+# For speed; what is compiled for size is named beside it (cutforce_for_size in options.cmake).
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR arm)
 set(CMAKE_CXX_COMPILER arm-none-eabi-g++)
@@ -23,7 +23,7 @@ endif()
 set(CUTFORCE_BOARD ${board_${CUTFORCE_CPU}})
 
 set(CMAKE_CXX_FLAGS_INIT
-    "-mcpu=${CUTFORCE_CPU} -mthumb -mfpu=${fpu_${CUTFORCE_CPU}} -mfloat-abi=hard -ffunction-sections -fdata-sections -fno-unwind-tables -fno-asynchronous-unwind-tables -fstack-usage -fcallgraph-info=su")
+    "-mcpu=${CUTFORCE_CPU} -mthumb -mfpu=${fpu_${CUTFORCE_CPU}} -mfloat-abi=hard -ffunction-sections -fdata-sections -fno-unwind-tables -fno-asynchronous-unwind-tables -fstack-usage -fcallgraph-info=su -Wno-psabi")
 
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY NEVER)

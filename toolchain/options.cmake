@@ -37,3 +37,20 @@ add_library(cutforce_core_options INTERFACE)
 target_link_libraries(cutforce_core_options INTERFACE cutforce_options)
 target_compile_options(cutforce_core_options INTERFACE
   -fno-exceptions -fno-rtti -fno-threadsafe-statics)
+
+# cutforce_for_size(SOURCE...): sources of this folder that bare metal compiles for size. They are those
+# that take no more instructions by it, or that no sample and no tick runs through often enough to
+# tell; host_tests/cortex_m/budget.txt holds both figures. Eigen becomes six times slower with -Os, and
+# pulls in free().
+function(cutforce_for_size)
+  if(NOT CUTFORCE_BOARD)
+    return()
+  endif()
+  foreach(source ${ARGN})
+    file(STRINGS ${source} eigen REGEX "#include <(Eigen|unsupported/Eigen)/")
+    if(eigen)
+      message(FATAL_ERROR "${CMAKE_CURRENT_SOURCE_DIR}/${source} includes Eigen: not for -Os")
+    endif()
+  endforeach()
+  set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS -Os)
+endfunction()

@@ -8,7 +8,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <new>
 
 #include "firmware/board_cycle.hpp"
 #include "firmware/configuration_board.hpp"
@@ -73,16 +72,17 @@ using Cycle = BoardCycle<Can, Pins, Source, 4, kRows>;
 constinit DoubleBuffer<AdcRow, kRows> buffer{};
 constinit std::size_t row = 0;
 constinit volatile std::uint32_t halves = 0;
-// Too large for a stack: made in its place.
-alignas(Board) constinit std::array<std::byte, sizeof(Board)> board_storage{};
+// The machine is known here, so the compiler derives the configuration, checks it and makes the
+// board. None of the code for that is in the image; the board's first value is.
+static_assert(check_loop(kMachine), "the machine that is compiled in is refused");
+constexpr Board::Config kConfig = board_config(kMachine, kWiring);
+static_assert(kConfig.check(), "the machine that is compiled in is refused");
+constinit Board board = Board::make_checked(kConfig);
 
-// The configuration is on the stack for as long as this takes, and no longer.
-[[gnu::noinline]] Board* make_the_board() {
-  if (!check_loop(kMachine)) return nullptr;
-  const auto config = board_config(kMachine, kWiring);
-  if (!config.check()) return nullptr;
-  return new (board_storage.data()) Board(Board::make_checked(config));
-}
+constexpr CmsdkTimer<MappedRegisters> kTimer{MappedRegisters{kBoard.timer}, kBoard.clock_hz};
+constinit Pins pins{MappedRegisters{kBoard.pins}, TimerWait{kTimer}, kPins};
+constinit Source source{buffer, scale()};
+constinit Cycle cycle{board, {.bytes = &pins, .source = &source}};
 
 void report(const BoardOutput& output, std::uint32_t missed) {
   console::write("override ");
@@ -98,12 +98,9 @@ void report(const BoardOutput& output, std::uint32_t missed) {
   console::write("\n");
 }
 
-[[noreturn, gnu::noinline]] void run_board(Board& board) {
-  CmsdkTimer<MappedRegisters> timer{MappedRegisters{kBoard.timer}, kBoard.clock_hz};
+[[noreturn, gnu::noinline]] void run_board() {
+  auto timer = kTimer;
   timer.start();
-  Pins pins{MappedRegisters{kBoard.pins}, TimerWait{timer}, kPins};
-  Source source{buffer, scale()};
-  static Cycle cycle(board, {.bytes = &pins, .source = &source});
   CmsdkWatchdog<MappedRegisters> watchdog{MappedRegisters{kBoard.watchdog}};
   watchdog.start(kWatchdog_ticks);
   auto system = kSystemControl;
@@ -145,13 +142,8 @@ extern "C" void timer_handler() {
 extern "C" int image_main() {
   using namespace cutforce::firmware;
   using namespace cutforce::firmware::cortex_m;
-  auto* const board = make_the_board();
-  if (board == nullptr) {
-    console::write("the machine that is compiled in is refused\n");
-    console::stop(1);
-  }
   console::write("cutforce on ");
   console::write(cutforce::hal::cortex_m::kBoard.name);
   console::write("\n");
-  run_board(*board);
+  run_board();
 }

@@ -183,7 +183,12 @@ class FieldReader {
   template <class Value>
   constexpr void take(const Field& field, std::int32_t code, Value& value) noexcept {
     in_range_ = in_range_ && code >= field.minimum && code <= field.maximum;
-    value = static_cast<Value>(value_of(field, std::clamp(code, field.minimum, field.maximum)));
+    const std::int32_t held = std::clamp(code, field.minimum, field.maximum);
+    if (field.is_whole()) {
+      value = static_cast<Value>(held);
+    } else {
+      value = static_cast<Value>(value_of(field, held));
+    }
   }
 
   std::uint64_t word_;

@@ -63,16 +63,22 @@ Frame pack_guarded(const Message& message, std::uint8_t node, std::uint8_t count
   return frame;
 }
 
+// Likewise.
 template <class Message>
-std::expected<Message, FrameError> unpack_fields(const Frame& frame) noexcept {
-  if (frame.extended || frame.remote || frame.length != Layout<Message>::kLength) {
-    return std::unexpected{FrameError::kFormat};
-  }
+[[gnu::flatten]] std::expected<Message, FrameError> message_in(const Frame& frame) noexcept {
   FieldReader reader{frame.data};
   Message message{};
   Layout<Message>::visit(reader, message);
   if (!reader.in_range()) return std::unexpected{FrameError::kRange};
   return message;
+}
+
+template <class Message>
+std::expected<Message, FrameError> unpack_fields(const Frame& frame) noexcept {
+  if (frame.extended || frame.remote || frame.length != Layout<Message>::kLength) {
+    return std::unexpected{FrameError::kFormat};
+  }
+  return message_in<Message>(frame);
 }
 
 }  // namespace

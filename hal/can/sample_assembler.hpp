@@ -67,7 +67,7 @@ class SampleAssembler {
   };
 
   // Fails iff check() does.
-  [[nodiscard]] static std::expected<SampleAssembler, ConfigError> make(
+  [[nodiscard]] static constexpr std::expected<SampleAssembler, ConfigError> make(
       const Config& config) noexcept;
 
   // A sample, or nothing where it has come before. `received_ns` does not go back. With a voltage
@@ -82,7 +82,7 @@ class SampleAssembler {
   static constexpr std::int64_t kLateCounts = 200;  // of a frame that follows the last by one
   static constexpr std::int64_t kSmoothing = 64;    // frames
 
-  explicit SampleAssembler(const Config& config) noexcept : config_(config) {}
+  explicit constexpr SampleAssembler(const Config& config) noexcept : config_(config) {}
 
   [[nodiscard]] std::int64_t advance(std::uint8_t count, std::int64_t received_ns) const noexcept;
   void put_phases(const Phases& phases, Sample& sample) const noexcept;
@@ -91,6 +91,12 @@ class SampleAssembler {
   Config config_;
   State state_{};
 };
+constexpr std::expected<SampleAssembler, SampleAssembler::ConfigError> SampleAssembler::make(
+    const Config& config) noexcept {
+  if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
+  return SampleAssembler{config};
+}
+
 static_assert(std::is_trivially_copyable_v<SampleAssembler>);
 
 }  // namespace cutforce::hal::can

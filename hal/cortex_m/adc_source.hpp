@@ -55,11 +55,12 @@ struct AdcScale {
 template <std::size_t kRows>
 class AdcSource {
  public:
-  AdcSource(DoubleBuffer<AdcRow, kRows>& buffer, const AdcScale& scale) noexcept
+  constexpr AdcSource(DoubleBuffer<AdcRow, kRows>& buffer, const AdcScale& scale) noexcept
       : buffer_(buffer), scale_(scale) {}
 
   // A half, or nothing. Fails with kSystem where the block is too small for a half.
-  [[nodiscard]] std::expected<Reading, PortError> read(std::span<Sample> block) noexcept {
+  [[nodiscard, gnu::noinline]] std::expected<Reading, PortError> read(
+      std::span<Sample> block) noexcept {
     if (block.size() < kRows) return std::unexpected{PortError::kSystem};
     std::array<AdcRow, kRows> rows;
     const auto taken = buffer_.take(rows);

@@ -58,7 +58,7 @@ struct BytePinsConfig {
 template <class Pins, RegisterBlock R, class Wait>
 class BytePins {
  public:
-  BytePins(R port, Wait wait, const BytePinsConfig& config) noexcept
+  constexpr BytePins(R port, Wait wait, const BytePinsConfig& config) noexcept
       : port_(port), wait_(wait), config_(config) {}
 
   [[nodiscard]] std::expected<ByteInput, PortError> write(const ByteOutput& output) noexcept {

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "hal/cortex_m/faults.hpp"
+#include "hal/cortex_m/packed_data.hpp"
 #include "hal/cortex_m/registers.hpp"
 #include "hal/cortex_m/stack.hpp"
 
@@ -12,7 +13,7 @@ extern "C" {
 // The linker script's; only their addresses mean anything.
 extern std::uint32_t data_begin[];
 extern std::uint32_t data_end[];
-extern const std::uint32_t data_image[];
+extern const std::uint8_t packed_data[];
 extern std::uint32_t bss_begin[];
 extern std::uint32_t bss_end[];
 extern std::uint32_t stack_end[];
@@ -66,8 +67,7 @@ extern "C" [[gnu::optimize("no-tree-loop-distribute-patterns")]] void reset_hand
   constexpr std::uint32_t kFullAccess = 0xFU << 20;  // CP10 and CP11: the FPU
   kSystemControl.store(kCoprocessorAccess, kSystemControl.load(kCoprocessorAccess) | kFullAccess);
   asm volatile("dsb\n\tisb" ::: "memory");
-  const std::uint32_t* image = data_image;
-  for (std::uint32_t* word = data_begin; word < data_end; ++word) *word = *image++;
+  unpack(packed_data, data_begin, data_end);
   for (std::uint32_t* word = bss_begin; word < bss_end; ++word) *word = 0;
   paint_stack();
   guard_stack();

@@ -26,7 +26,9 @@ template <RegisterBlock R>
 class CmsdkTimer {
  public:
   constexpr CmsdkTimer(R registers, std::uint32_t clock_hz) noexcept
-      : registers_(registers), clock_hz_(clock_hz) {}
+      : registers_(registers),
+        ticks_per_ns_(static_cast<std::uint32_t>(((std::uint64_t{clock_hz} << 32U) + 999'999'999U) /
+                                                 1'000'000'000U)) {}
 
   void start() noexcept {
     constexpr std::uint32_t kEnable = 1U << 0;
@@ -38,7 +40,7 @@ class CmsdkTimer {
   void wait(std::uint32_t nanoseconds) noexcept {
     const std::uint32_t began = registers_.load(kValue);
     const auto ticks = static_cast<std::uint32_t>(
-        (std::uint64_t{nanoseconds} * clock_hz_ + 999'999'999U) / 1'000'000'000U);
+        (std::uint64_t{nanoseconds} * ticks_per_ns_ + ~std::uint32_t{0}) >> 32U);
     while (began - registers_.load(kValue) < ticks) {  // it counts down
     }
   }
@@ -49,7 +51,7 @@ class CmsdkTimer {
   static constexpr std::size_t kReload = 0x8;
 
   R registers_;
-  std::uint32_t clock_hz_;
+  std::uint32_t ticks_per_ns_;  // in parts of 2^32, rounded up: below 1 for clocks up to 1 GHz
 };
 
 }  // namespace cutforce::hal::cortex_m

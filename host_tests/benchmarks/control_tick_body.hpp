@@ -36,7 +36,7 @@ class SynthesizedTick {
   [[nodiscard]] bool add(const hal::Sample& sample) noexcept {
     keep(gate_.step(gated(sample)));
     const auto& values = gate_.values();
-    return path_.add({.motor = front_end_.motor(values.voltage_v, values.current_a),
+    return path_.add({.motor = front_end_.step({values.voltage_v, values.current_a}).motor,
                       .speed_rad_s = values.speed_rad_s,
                       .power_meter_w = values.power_w,
                       .motor_valid = true,

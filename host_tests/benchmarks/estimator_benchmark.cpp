@@ -2,6 +2,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "control/control_path.hpp"
 #include "estimator/front_end.hpp"
@@ -13,6 +14,7 @@
 #include "firmware/control_loop.hpp"
 #include "host_tests/benchmarks/body.hpp"
 #include "host_tests/benchmarks/recorded_cut.hpp"
+#include "host_tests/benchmarks/target_bodies.hpp"
 
 namespace cutforce::benchmarks {
 namespace {
@@ -22,27 +24,16 @@ using estimator::SampleGate;
 using firmware::ControlLoop;
 using firmware::EstimatorName;
 using hal::Sample;
-using hal::Signal;
 
 constexpr double kRateHz = 5000.0;
-constexpr int kSamplesPerTick = 5;
-constexpr int kSamplesPerWindow = 250;
+constexpr std::size_t kSamplesPerWindow = 250;
 
 ControlLoop::Config config_of(EstimatorName estimator) {
   return firmware::make_loop_config(lathe_at(kRateHz, estimator)).value();
 }
 
-// As firmware/control_loop.cpp hands a sample on.
-SampleGate::Input gate_input(const Sample& s) {
-  return {.time_ns = s.time_ns,
-          .values = {.voltage_v = s.voltage_v,
-                     .current_a = s.current_a,
-                     .speed_rad_s = s.speed_rad_s,
-                     .power_w = s.power_meter_w},
-          .present = SampleGate::kSpeed | SampleGate::kPower};
-}
-
-// Every raw sample, whatever the estimator: plausible, corrected, watched, and its torque.
+// Every raw sample, whatever the estimator: plausible, corrected, watched, and its torque. In runs
+// of a millisecond, as firmware/control_loop.cpp takes them; one call is one of five samples.
 class SamplePath {
  public:
   explicit SamplePath(const ControlLoop::Config& config)
@@ -54,24 +45,20 @@ class SamplePath {
   }
 
   void step(const Sample& s) noexcept {
-    const SampleGate::Values values{.voltage_v = {s.voltage_v[0], s.voltage_v[1], s.voltage_v[2]},
-                                    .current_a = {s.current_a[0], s.current_a[1], s.current_a[2]},
-                                    .speed_rad_s = s.speed_rad_s,
-                                    .power_w = s.power_meter_w};
-    if (!gate_.accepts(s.time_ns, values, SampleGate::kSpeed | SampleGate::kPower)) {
-      keep(gate_.step(gate_input(s)));
-      return;
+    samples_[filled_] = s;
+    if (++filled_ < samples_.size()) return;
+    filled_ = 0;
+    firmware::SampleRun run;
+    run.speed_sum_rad_s = 0.0F;
+    run.take(samples_, gate_, front_end_);
+    if (run.count == 0) keep(gate_.step(gated(samples_.back())));  // the very first
+    const auto count = static_cast<std::uint32_t>(run.count);
+    if (const std::uint32_t k = health_.wanted(count); k < count) {
+      const Sample& at = samples_[k];
+      health_.look(at.voltage_v, at.current_a, run.motor[k], front_end_.residual_a(at.current_a),
+                   count - 1 - k);
     }
-    const auto motor = front_end_.motor(values.voltage_v, values.current_a);
-    if (health_.wants(1.0F, 0)) {
-      health_.look({.voltage_v = values.voltage_v,
-                    .current_a = values.current_a,
-                    .motor = motor,
-                    .current_residual_a = front_end_.residual_a(values.current_a),
-                    .elapsed_periods = 1.0F,
-                    .at_end_channels = 0});
-    }
-    flux_.step(motor, 1.0F);
+    flux_.step_run(std::span(run.motor).first(count));
     keep(flux_);
   }
 
@@ -80,6 +67,8 @@ class SamplePath {
   estimator::FrontEnd front_end_;
   estimator::SignalHealth health_;
   estimator::FluxTorque flux_;
+  std::array<Sample, kSamplesPerTick> samples_{};
+  std::size_t filled_ = 0;
 };
 
 const Body kNextSample{"endless_cut_itself",
@@ -99,7 +88,7 @@ class FusedCut {
   FusedCut()
       : front_end_(*estimator::FrontEnd::make(config_of(EstimatorName::kFused).front_end)),
         observer_(make_observer()) {
-    int k = 0;
+    std::size_t k = 0;
     for (const Sample& sample : cut_.beginning()) {
       step(sample);
       if (++k % kSamplesPerTick == 0) tick();
@@ -108,7 +97,7 @@ class FusedCut {
 
   void sample() noexcept { step(cut_.next()); }
   void millisecond() noexcept {
-    for (int k = 0; k < kSamplesPerTick; ++k) sample();
+    for (std::size_t k = 0; k < kSamplesPerTick; ++k) sample();
     tick();
   }
 
@@ -150,7 +139,7 @@ class PathCut {
   }
 
   void window() noexcept {
-    for (int k = 0; k < kSamplesPerWindow; ++k) step(cut_.next());
+    for (std::size_t k = 0; k < kSamplesPerWindow; ++k) step(cut_.next());
   }
 
  private:
@@ -199,7 +188,11 @@ class LoopCut {
     for (const Sample& sample : cut_.beginning()) keep(loop_.step(sample));
   }
   void control_period() noexcept {
-    for (int k = 0; k < kSamplesPerWindow; ++k) keep(loop_.step(cut_.next()));
+    std::array<Sample, kSamplesPerTick> block{};
+    for (std::size_t k = 0; k < kSamplesPerWindow; k += kSamplesPerTick) {
+      for (Sample& sample : block) sample = cut_.next();
+      for (std::span<const Sample> rest = block; !rest.empty();) keep(loop_.step(rest));
+    }
   }
 
  private:

@@ -1,4 +1,6 @@
 // The bodies that the bare-metal meter counts (host_tests/cortex_m), here on x86-64.
+#include <array>
+
 #include "firmware/configuration.hpp"
 #include "host_tests/benchmarks/body.hpp"
 #include "host_tests/benchmarks/recorded_cut.hpp"
@@ -15,16 +17,19 @@ firmware::ControlLoop::Config config() {
   return firmware::make_loop_config(lathe_at(kRateHz, EstimatorName::kFused)).value();
 }
 
-const Body kAirGap{"target_raw_air_gap_power", [] {
-                     return [cut = EndlessCut(kRateHz), body = AirGapSample(config())]() mutable {
-                       body.step(cut.next());
-                     };
-                   }};
-const Body kFused{"target_raw_fused", [] {
-                    return [cut = EndlessCut(kRateHz), body = FusedSample(config())]() mutable {
-                      body.step(cut.next());
-                    };
-                  }};
+// Runs of five samples, so one call is a millisecond.
+template <class Samples>
+auto runs() {
+  return [cut = EndlessCut(kRateHz), body = Samples(config()), started = false]() mutable {
+    if (!started) body.start(cut.next());
+    started = true;
+    std::array<hal::Sample, kSamplesPerTick> block{};
+    for (hal::Sample& sample : block) sample = cut.next();
+    body.step(block);
+  };
+}
+const Body kAirGap{"target_raw_air_gap_power_5", [] { return runs<AirGapSamples>(); }};
+const Body kFused{"target_raw_fused_5", [] { return runs<FusedSamples>(); }};
 const Body kPi{"target_pi_step", [] {
                  return [body = PiTick(config().controller.law.pi), tick = 0U]() mutable {
                    body.prepare(tick++);

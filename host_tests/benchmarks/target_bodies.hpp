@@ -4,7 +4,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "control/control_path.hpp"
 #include "control/predictive.hpp"
@@ -14,12 +16,12 @@
 #include "estimator/sample_gate.hpp"
 #include "estimator/space_vector.hpp"
 #include "firmware/control_loop.hpp"
+#include "firmware/sample_run.hpp"
 #include "hal/can/guard.hpp"
 #include "host_tests/benchmarks/keep.hpp"
 
 namespace cutforce::benchmarks {
 
-// As firmware/control_loop.cpp hands a sample on.
 [[nodiscard]] inline estimator::SampleGate::Input gated(const hal::Sample& s) {
   return {.time_ns = s.time_ns,
           .values = {.voltage_v = s.voltage_v,
@@ -29,54 +31,61 @@ namespace cutforce::benchmarks {
           .present = estimator::SampleGate::kSpeed | estimator::SampleGate::kPower};
 }
 
+// Samples come in runs, as a converter's DMA delivers them.
+inline constexpr std::size_t kSamplesPerTick = 5;
+
 // Six channels: gate, scale, power less copper loss, window sums.
-class AirGapSample {
+class AirGapSamples {
  public:
-  explicit AirGapSample(const firmware::ControlLoop::Config& config)
+  explicit AirGapSamples(const firmware::ControlLoop::Config& config)
       : gate_(*estimator::SampleGate::make(config.gate)),
         front_end_(*estimator::FrontEnd::make(config.front_end)),
         power_(*estimator::AirGapPower::make(config.path.power)) {}
 
-  void step(const hal::Sample& sample) noexcept {
-    keep(gate_.step(gated(sample)));
-    const auto& values = gate_.values();
-    const auto front =
-        front_end_.step({.voltage_v = values.voltage_v, .current_a = values.current_a});
-    keep(power_.step({.sample = front.motor, .electrical_rad_s = 210.0F}));
+  void step(std::span<const hal::Sample> samples) noexcept {
+    firmware::SampleRun run;
+    run.speed_sum_rad_s = 0.0F;
+    run.take(samples, gate_, front_end_);
+    if (power_.add_run(std::span(run.motor).first(run.count), 210.0F)) keep(power_.close_window());
+    taken_ += static_cast<std::uint32_t>(run.count);
   }
+  // Every sample at rest before the first, so that the first is a usual one.
+  void start(const hal::Sample& sample) noexcept { keep(gate_.step(gated(sample))); }
+  [[nodiscard]] std::uint32_t taken() const noexcept { return taken_; }
 
  private:
   estimator::SampleGate gate_;
   estimator::FrontEnd front_end_;
   estimator::AirGapPower power_;
+  std::uint32_t taken_ = 0;
 };
 
 // The same for the fused observer, and its tick.
-class FusedSample {
+class FusedSamples {
  public:
-  explicit FusedSample(const firmware::ControlLoop::Config& config)
+  explicit FusedSamples(const firmware::ControlLoop::Config& config)
       : gate_(*estimator::SampleGate::make(config.gate)),
         front_end_(*estimator::FrontEnd::make(config.front_end)),
         observer_(*estimator::FusedObserver::make(config.fused)) {}
 
-  void step(const hal::Sample& sample) noexcept {
-    const auto checked = gate_.step(gated(sample));
-    const auto& values = gate_.values();
-    const auto front =
-        front_end_.step({.voltage_v = values.voltage_v, .current_a = values.current_a});
-    observer_.step({.motor = front.motor,
-                    .speed_rad_s = values.speed_rad_s,
-                    .power_meter_w = values.power_w,
-                    .elapsed_periods = checked.elapsed_periods,
-                    .speed_valid = true,
-                    .meter_valid = true});
+  void step(std::span<const hal::Sample> samples) noexcept {
+    firmware::SampleRun run;
+    run.speed_sum_rad_s = observer_.speed_sum_rad_s();
+    run.take(samples, gate_, front_end_);
+    observer_.step_run(std::span(run.motor).first(run.count));
+    observer_.note_speeds(run.speed_sum_rad_s, static_cast<std::uint32_t>(run.count));
+    observer_.note_meter(samples.back().power_meter_w);
+    taken_ += static_cast<std::uint32_t>(run.count);
   }
+  void start(const hal::Sample& sample) noexcept { keep(gate_.step(gated(sample))); }
   void tick() noexcept { keep(observer_.tick(estimator::AirCut::Feed::kUnknown)); }
+  [[nodiscard]] std::uint32_t taken() const noexcept { return taken_; }
 
  private:
   estimator::SampleGate gate_;
   estimator::FrontEnd front_end_;
   estimator::FusedObserver observer_;
+  std::uint32_t taken_ = 0;
 };
 
 // A cut for a controller: force over override by a gain that steps, with noise, so that each law
@@ -172,7 +181,7 @@ class PhasePower {
       : front_end_(*estimator::FrontEnd::make(config.front_end)) {}
 
   void step(const std::array<float, 3>& voltage_v, const std::array<float, 3>& current_a) noexcept {
-    power_w_ = estimator::input_power(front_end_.motor(voltage_v, current_a));
+    power_w_ = estimator::input_power(front_end_.step({voltage_v, current_a}).motor);
   }
 
  private:

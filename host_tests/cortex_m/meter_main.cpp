@@ -36,13 +36,15 @@ class Counts {
     most_ = count > most_ ? count : most_;
     ++calls_;
   }
-  void show(std::string_view name) const noexcept {
+  // A call, or one of `parts` that it has.
+  void show(std::string_view name, std::uint32_t parts = 1) const noexcept {
     if (calls_ == 0) return;
+    const std::uint32_t all = calls_ * parts;
     console::write(name);
     console::write(" ");
-    console::write_number(static_cast<std::uint32_t>((sum_ + calls_ / 2) / calls_));
+    console::write_number(static_cast<std::uint32_t>((sum_ + all / 2) / all));
     console::write(" ");
-    console::write_number(most_);
+    console::write_number((most_ + parts - 1) / parts);
     console::write("\n");
   }
 
@@ -79,41 +81,49 @@ void show_calibration(Meter& meter) {
 // Seconds of the stream that are run in and not counted, and that are.
 constexpr std::uint32_t kRunIn = 15'000;
 constexpr std::uint32_t kCounted = 20'000;
-constexpr std::uint32_t kSamplesPerTick = 5;
 
-template <class Step>
-bool over_stream(std::string_view name, const Step& step) {
+// The stream's first sample alone, then blocks that each end with an estimate period.
+template <class First, class Step>
+bool over_stream(std::string_view name, const First& first, const Step& step) {
   auto port = StreamPort::open(name, std::as_writable_bytes(std::span(&machine, 1)));
   if (!port) return false;
-  std::array<hal::Sample, 1> block{};
-  for (std::uint32_t k = 0; k < kRunIn + kCounted; ++k) {
-    const auto count = port->read(block);
-    if (!count || *count == 0) return false;
-    step(block[0], k >= kRunIn, k);
+  std::array<hal::Sample, kSamplesPerTick> block{};
+  const auto read = [&port](hal::Sample& sample) {
+    const auto count = port->read(std::span(&sample, 1));
+    return count && *count == 1;
+  };
+  if (!read(block[0])) return false;
+  first(block[0]);
+  for (std::uint32_t k = 0; k < kRunIn + kCounted; k += kSamplesPerTick) {
+    for (hal::Sample& sample : block)
+      if (!read(sample)) return false;
+    step(std::span<const hal::Sample>(block), k >= kRunIn);
   }
   return true;
 }
 
 bool count_samples(Meter& meter, std::string_view stream, const ControlLoop::Config& config) {
-  static constinit Place<AirGapSample> air_gap_place{};
-  static constinit Place<FusedSample> fused_place{};
+  static constinit Place<AirGapSamples> air_gap_place{};
+  static constinit Place<FusedSamples> fused_place{};
   auto& air_gap = air_gap_place.make(config);
   auto& fused = fused_place.make(config);
   Counts power;
   Counts sample;
   Counts tick;
-  const bool read = over_stream(stream, [&](const hal::Sample& s, bool counted, std::uint32_t k) {
-    const std::uint32_t a = meter.count([&] { air_gap.step(s); });
-    const std::uint32_t b = meter.count([&] { fused.step(s); });
-    if (counted) power.add(a), sample.add(b);
-    if (k % kSamplesPerTick != kSamplesPerTick - 1) return;
-    const std::uint32_t c = meter.count([&] { fused.tick(); });
-    if (counted) tick.add(c);
-  });
-  power.show("raw_air_gap_power");
-  sample.show("raw_fused");
+  const auto start = [&](const hal::Sample& s) { air_gap.start(s), fused.start(s); };
+  const bool read =
+      over_stream(stream, start, [&](std::span<const hal::Sample> block, bool counted) {
+        const std::uint32_t a = meter.count([&] { air_gap.step(block); });
+        const std::uint32_t b = meter.count([&] { fused.step(block); });
+        const std::uint32_t c = meter.count([&] { fused.tick(); });
+        if (counted) power.add(a), sample.add(b), tick.add(c);
+      });
+  power.show("raw_air_gap_power", kSamplesPerTick);
+  sample.show("raw_fused", kSamplesPerTick);
   tick.show("tick_fused");
-  return read;
+  // A run that is broken off would be cheap.
+  constexpr std::uint32_t kAll = kRunIn + kCounted;
+  return read && air_gap.taken() == kAll && fused.taken() == kAll;
 }
 
 // The same tick as a whole, and in its parts.
@@ -131,9 +141,9 @@ bool count_control_tick(Meter& meter, std::string_view stream) {
   auto& parts = parts_place.make(*config, supervisor);
   Counts tick;
   std::array<Counts, 5> part;
-  const bool read = over_stream(stream, [&](const hal::Sample& s, bool counted, std::uint32_t) {
-    const bool due = whole.add(s);
-    keep(parts.add(s));
+  const auto step = [&](const hal::Sample& sample, bool counted) {
+    const bool due = whole.add(sample);
+    keep(parts.add(sample));
     if (!due) return;
     const std::array<std::uint32_t, 5> used{
         meter.count([&] { parts.close_window(); }), meter.count([&] { parts.find_force(); }),
@@ -143,7 +153,12 @@ bool count_control_tick(Meter& meter, std::string_view stream) {
     if (!counted) return;
     tick.add(all);
     for (std::size_t k = 0; k < part.size(); ++k) part[k].add(used[k]);
-  });
+  };
+  const bool read = over_stream(
+      stream, [&](const hal::Sample& sample) { step(sample, false); },
+      [&](std::span<const hal::Sample> block, bool counted) {
+        for (const hal::Sample& sample : block) step(sample, counted);
+      });
   tick.show("control_tick_synthesized");
   constexpr std::array<std::string_view, 5> kNames{"torque_path_window", "cutting_force",
                                                    "control_path_pi", "supervisor_step",
@@ -176,13 +191,25 @@ bool count_loop(Meter& meter, std::string_view stream, const LoopNames& names) {
   Counts raw;
   Counts tick;
   Counts control;
-  const bool read = over_stream(stream, [&](const hal::Sample& s, bool counted, std::uint32_t) {
-    std::optional<firmware::LoopOutput> output;
-    const std::uint32_t count = meter.count([&] { output = made->step(s); });
-    if (!counted) return;
-    (!output ? raw : output->control_tick ? control : tick).add(count);
-  });
-  raw.show(names.raw);
+  const auto start = [&](const hal::Sample& s) { static_cast<void>(made->step(s)); };
+  const bool read =
+      over_stream(stream, start, [&](std::span<const hal::Sample> block, bool counted) {
+        auto last = block.last(1);
+        auto before = block.first(kSamplesPerTick - 1);
+        bool closed = false;
+        bool controlled = false;
+        const auto step = [&](std::span<const hal::Sample>& samples) {
+          const auto output = made->step(samples);
+          closed = output.has_value();
+          controlled = closed && output->control_tick;
+        };
+        const std::uint32_t a = meter.count([&] { step(before); });
+        const std::uint32_t b = meter.count([&] { step(last); });
+        if (!counted || !closed) return;
+        raw.add(a);
+        (controlled ? control : tick).add(b);
+      });
+  raw.show(names.raw, kSamplesPerTick - 1);
   tick.show(names.tick);
   control.show(names.control);
   return read;

@@ -3,7 +3,7 @@
 
 size.py IMAGE [--brief]      reads IMAGE and IMAGE.map, which the link leaves beside it
 
-Flash is code, constants and the first values of variables; RAM is variables, with the stack beside
+Flash is code, constants and the first values of variables (pack_data.py); RAM is variables, with the stack beside
 them as the linker script gives it. --brief prints the two sums only.
 """
 import argparse
@@ -55,14 +55,15 @@ def main():
     if not given.image.exists():
         sys.exit(f"{given.image} is missing: cmake --preset cortex-m && cmake --build --preset cortex-m")
     size = sections(given.image)
-    data = size.get(".data", 0)
-    print("flash", size[".text"] + size.get(".ARM.exidx", 0) + data)
-    print("ram", data + size.get(".bss", 0))
+    packed = size.get(".packed", 0)
+    print("flash", size[".text"] + size.get(".ARM.exidx", 0) + packed)
+    print("ram", size.get(".data", 0) + size.get(".bss", 0))
     if given.brief:
         return
     print("stack", size[".stack"])
     flash, ram = by_archive(given.image.with_name(given.image.name + ".map").read_text())
     print(f"\n{'':28}{'flash':>8}{'ram':>8}")
+    flash["first values, packed"] = packed
     for name, _ in sorted((flash + ram).items(), key=lambda item: -item[1]):
         print(f"{name:28}{flash[name]:8}{ram[name]:8}")
     print("\nlargest in RAM")
