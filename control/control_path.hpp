@@ -322,6 +322,7 @@ class BasicControlPath {
 };
 
 using ControlPath = BasicControlPath<LawSet>;
+extern template class BasicControlPath<LawSet>;  // in control_path.cpp, whoever else uses it
 
 static_assert(std::is_trivially_copyable_v<ControlPath>);
 static_assert(std::is_trivially_copyable_v<ControlPath::State> &&

@@ -80,7 +80,7 @@ class FluxTorque {
   void step_run(std::span<const MotorSample> samples) noexcept;
   // elapsed_periods: time since the last sample in nominal sample periods. With 1 the same as a run
   // of one.
-  void step(const MotorSample& sample, float elapsed_periods) noexcept;
+  [[gnu::cold]] void step(const MotorSample& sample, float elapsed_periods) noexcept;
 
   // Closes the window. Duration 0 (no sample since the last call) gives the last torque.
   [[nodiscard]] Window take() noexcept;

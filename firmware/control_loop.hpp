@@ -167,7 +167,7 @@ class ControlLoop {
   [[nodiscard]] std::size_t step_run(std::span<const hal::Sample> samples) noexcept;
   [[nodiscard]] std::size_t longest_run(std::size_t samples) const noexcept;
   void pass_run(std::span<const hal::Sample> samples, const SampleRun& run) noexcept;
-  void step_alone(const hal::Sample& sample) noexcept;
+  [[gnu::cold]] void step_alone(const hal::Sample& sample) noexcept;
   void estimate_alone(const estimator::MotorSample& motor,
                       const estimator::SampleGate::Output& gated) noexcept;
   void note_commands(std::span<const hal::Sample> samples) noexcept;

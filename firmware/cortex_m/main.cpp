@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "firmware/board_cycle.hpp"
 #include "firmware/configuration_board.hpp"
@@ -26,6 +27,7 @@ namespace cutforce::firmware::cortex_m {
 namespace {
 
 using namespace hal::cortex_m;
+using namespace std::string_view_literals;  // their lengths are known here: no strlen()
 
 constexpr std::size_t kRows = 5;  // a millisecond at 5 kHz
 constexpr std::uint16_t kRest = 2048;
@@ -85,17 +87,17 @@ constinit Source source{buffer, scale()};
 constinit Cycle cycle{board, {.bytes = &pins, .source = &source}};
 
 void report(const BoardOutput& output, std::uint32_t missed) {
-  console::write("override ");
+  console::write("override "sv);
   console::write_number(output.supervision.override_pct);
-  console::write(" state ");
+  console::write(" state "sv);
   console::write_number(static_cast<std::uint32_t>(output.supervision.state));
-  console::write(" reason ");
+  console::write(" reason "sv);
   console::write_number(static_cast<std::uint32_t>(output.supervision.reason));
-  console::write(" missed ");
+  console::write(" missed "sv);
   console::write_number(missed);
-  console::write(" stack ");
+  console::write(" stack "sv);
   console::write_number(static_cast<std::uint32_t>(stack_high_water()));
-  console::write("\n");
+  console::write("\n"sv);
 }
 
 [[noreturn, gnu::noinline]] void run_board() {
@@ -142,8 +144,9 @@ extern "C" void timer_handler() {
 extern "C" int image_main() {
   using namespace cutforce::firmware;
   using namespace cutforce::firmware::cortex_m;
-  console::write("cutforce on ");
+  using namespace std::string_view_literals;
+  console::write("cutforce on "sv);
   console::write(cutforce::hal::cortex_m::kBoard.name);
-  console::write("\n");
+  console::write("\n"sv);
   run_board();
 }

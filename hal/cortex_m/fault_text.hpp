@@ -79,33 +79,34 @@ template <class Print, class BelowStack>
 void tell_fault(std::string_view handler, std::uint32_t cfsr, std::uint32_t hfsr,
                 std::uint32_t mmfar, std::uint32_t bfar, const Print& print,
                 const BelowStack& below_stack) {
+  using namespace std::string_view_literals;
   const auto number = [&](std::string_view name, std::uint32_t value) {
     const auto digits = hexadecimal(value);
     print(name);
     print(std::string_view{digits.data(), digits.size()});
   };
-  print("FAULT ");
+  print("FAULT "sv);
   print(handler);
-  number(", CFSR ", cfsr);
-  number(", HFSR ", hfsr);
-  if (has_memory_address(cfsr)) number(", MMFAR ", mmfar);
-  if (has_bus_address(cfsr)) number(", BFAR ", bfar);
-  print("\n");
+  number(", CFSR "sv, cfsr);
+  number(", HFSR "sv, hfsr);
+  if (has_memory_address(cfsr)) number(", MMFAR "sv, mmfar);
+  if (has_bus_address(cfsr)) number(", BFAR "sv, bfar);
+  print("\n"sv);
   for (const FaultBit& bit : kHardFaultBits) {
     if ((hfsr & bit.mask) == 0) continue;
-    print("  ");
+    print("  "sv);
     print(bit.words);
-    print("\n");
+    print("\n"sv);
   }
   for (const FaultBit& bit : kFaultBits) {
     if ((cfsr & bit.mask) == 0) continue;
-    print("  ");
+    print("  "sv);
     print(bit.words);
-    print("\n");
+    print("\n"sv);
   }
   const bool guard = (has_memory_address(cfsr) && below_stack(mmfar)) ||
                      (has_bus_address(cfsr) && below_stack(bfar)) || is_stacking(cfsr);
-  if (guard) print("  the stack has overflowed into its guard\n");
+  if (guard) print("  the stack has overflowed into its guard\n"sv);
 }
 
 }  // namespace cutforce::hal::cortex_m

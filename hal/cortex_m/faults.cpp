@@ -12,6 +12,8 @@
 namespace cutforce::hal::cortex_m {
 namespace {
 
+using namespace std::string_view_literals;  // their lengths are known here: no strlen()
+
 constexpr int kFaultStatus_exit = 99;
 constexpr int kAbandonedStatus_exit = 98;
 
@@ -48,17 +50,17 @@ void tell_and_stop(std::uint32_t handler, const SavedState* saved) {
   if (!is_stacking(status) && !is_below_stack(reinterpret_cast<std::uint32_t>(saved))) {
     const auto place = hexadecimal(saved->place);
     const auto caller = hexadecimal(saved->return_address);
-    console::write("  at ");
+    console::write("  at "sv);
     console::write({place.data(), place.size()});
-    console::write(", which returns to ");
+    console::write(", which returns to "sv);
     console::write({caller.data(), caller.size()});
-    console::write("\n");
+    console::write("\n"sv);
   }
   console::stop(kFaultStatus_exit);
 }
 
 void stop_abandoned() noexcept {
-  console::write("FAULT abandoned: abort, or the image ended\n");
+  console::write("FAULT abandoned: abort, or the image ended\n"sv);
   console::stop(kAbandonedStatus_exit);
 }
 
