@@ -59,11 +59,11 @@ class SynthesizedTick {
                           .force_sigma_n = force_.force_sigma_n,
                           .force_age_ticks = 0,
                           .override_reported_pct = static_cast<float>(supervision_.override_pct),
-                          .spindle_ratio = 1.0F,
+                          .spindle_ratio = spindle_ratio_,
                           .force_valid = has_force(),
-                          .override_reported = true,
+                          .override_reported = override_reported_,
                           .permission = supervision_.permission,
-                          .part_start = false});
+                          .part_start = part_start_});
     command_.override_pct = controlled.override_pct;
     command_.override_code = controlled.override_code;
     command_.controlling = controlled.controlling;
@@ -151,6 +151,9 @@ class SynthesizedTick {
   control::Supervisor::Output supervision_{};
   hal::can::Frame frame_{};
   std::uint8_t counter_ = 0;
+  float spindle_ratio_ = 1.0F;
+  bool override_reported_ = true;
+  bool part_start_ = false;
   float diameter_m_;
   estimator::CuttingForce cutting_force_;
   control::Supervisor supervisor_;
