@@ -64,19 +64,21 @@ class AppliedOverride {
   }
 
   // A report that is not within 0..255 % tells nothing.
-  [[nodiscard]] constexpr Output step(const Input& input) noexcept {
+  [[nodiscard]] [[gnu::always_inline]] constexpr Output step(const Input& input) noexcept {
     state_.newest = (state_.newest + kHistory - 1) % kHistory;
     state_.sent_pct[state_.newest] = input.sent_pct;
 
-    const bool told = input.reported && input.reported_pct >= 0.0F && input.reported_pct <= 255.0F;
-    if (!told || follows(input.reported_pct)) {
+    // At rest, the report is what was sent last: then the ring need not be read.
+    const auto sent_pct = static_cast<float>(input.sent_pct);
+    if (!input.reported || within(sent_pct, sent_pct, input.reported_pct) ||
+        !(input.reported_pct >= 0.0F && input.reported_pct <= 255.0F) ||
+        follows(input.reported_pct)) {
       state_.differing_ticks = 0;
     } else {
       state_.differing_ticks = std::min(state_.differing_ticks + 1, config_.confirm_ticks);
     }
     const bool locked = state_.differing_ticks >= config_.confirm_ticks;
-    return {.applied_pct = locked ? input.reported_pct : static_cast<float>(input.sent_pct),
-            .follows = !locked};
+    return {.applied_pct = locked ? input.reported_pct : sent_pct, .follows = !locked};
   }
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
@@ -88,15 +90,19 @@ class AppliedOverride {
   }
 
   [[nodiscard]] constexpr bool follows(float reported_pct) const noexcept {  // (C14)
-    std::uint8_t lowest = 255;
-    std::uint8_t highest = 0;
-    for (std::size_t i = 0; i <= config_.delay_ticks; ++i) {
-      const std::uint8_t sent = state_.sent_pct[(state_.newest + i) % kHistory];
-      lowest = std::min(lowest, sent);
-      highest = std::max(highest, sent);
+    std::uint32_t lowest = 255;
+    std::uint32_t highest = 0;
+    for (std::uint32_t i = 0; i <= config_.delay_ticks; ++i) {
+      const std::uint32_t sent = state_.sent_pct[(state_.newest + i) % kHistory];
+      lowest = sent < lowest ? sent : lowest;
+      highest = sent > highest ? sent : highest;
     }
-    return reported_pct >= static_cast<float>(lowest) - config_.tolerance_pct &&
-           reported_pct <= static_cast<float>(highest) + config_.tolerance_pct;
+    return within(static_cast<float>(lowest), static_cast<float>(highest), reported_pct);
+  }
+  [[nodiscard]] constexpr bool within(float lowest_pct, float highest_pct,
+                                      float reported_pct) const noexcept {
+    return reported_pct >= lowest_pct - config_.tolerance_pct &&
+           reported_pct <= highest_pct + config_.tolerance_pct;
   }
 
   Config config_;

@@ -146,7 +146,8 @@ class BasicControlPath {
     return BasicControlPath{config};
   }
 
-  [[nodiscard]] constexpr Output step(const Input& input) noexcept {
+  // Inlined where it is stepped: neither input nor output is put together in memory then.
+  [[nodiscard]] [[gnu::always_inline]] constexpr Output step(const Input& input) noexcept {
     const auto force = force_input_.step({.force_n = input.force_n,
                                           .force_sigma_n = input.force_sigma_n,
                                           .age_ticks = input.force_age_ticks,
@@ -248,9 +249,9 @@ class BasicControlPath {
         highest_n_(config.force_input.highest_n),
         force_input_(*ForceInput::make(config.force_input)),
         cut_state_(*CutState::make(config.cut_state)),
-        law_(checked_law(config.law)),
         feed_override_(*FeedOverride::make(config.feed_override)),
-        applied_override_(*AppliedOverride::make(config.applied_override)) {}
+        applied_override_(*AppliedOverride::make(config.applied_override)),
+        law_(checked_law(config.law)) {}
 
   // The permitted force to hold, if there is one; NaN is none.
   [[nodiscard]] constexpr float reference(float permitted_n) const noexcept {
@@ -266,9 +267,7 @@ class BasicControlPath {
                         .mode = LawMode::kHold,
                         .may_rise = false,
                         .controlling = controlling};
-    // From where the fall has got to, which is between two steps; from what was sent at its begin.
-    const float fallen_pct =
-        std::min(fall_pct_, sent_pct + feed_override_.tolerance_pct()) - fall_pct_per_tick_;
+    const float fall_pct = fall_pct_;
     fall_pct_ = sent_pct;
 
     if (!controlling) {
@@ -278,6 +277,10 @@ class BasicControlPath {
               .controlling = false};
     }
     if (force == ForceOutcome::kLost) {
+      // From where the fall has got to, which is between two steps; from what was sent at its
+      // begin.
+      const float fallen_pct =
+          std::min(fall_pct, sent_pct + feed_override_.tolerance_pct()) - fall_pct_per_tick_;
       fall_pct_ = std::max(fallen_pct, std::min(fallback_pct_, sent_pct));  // (C11)
       Decision fall = stay;
       fall.wanted_pct = fall_pct_;
@@ -311,11 +314,11 @@ class BasicControlPath {
   float highest_n_;
   ForceInput force_input_;
   CutState cut_state_;
-  L law_;
   FeedOverride feed_override_;
   AppliedOverride applied_override_;
   float fall_pct_ = 0.0F;
   std::uint32_t started_ = 0;
+  L law_;  // last: a set of laws is large, and all else within a short reach
 };
 
 using ControlPath = BasicControlPath<LawSet>;

@@ -71,14 +71,14 @@ class CutState {
     return CutState{config};
   }
 
-  [[nodiscard]] constexpr Output step(const Input& input) noexcept {
+  [[nodiscard]] [[gnu::always_inline]] constexpr Output step(const Input& input) noexcept {
     if (!input.fresh) return {.phase = state_.phase, .falling = false};
     const bool on = input.force_n > config_.on_ratio * input.force_reference_n;    // (C6)
     const bool off = input.force_n < config_.off_ratio * input.force_reference_n;  // (C6)
     const bool steep =
         state_.force_n - input.force_n > config_.drop_ratio * state_.force_n;  // (C7)
     state_.force_n = input.force_n;
-    state_.ticks = std::min(state_.ticks + 1, lost_ticks_ + entry_ticks_ + 1);
+    state_.ticks = state_.ticks < most_ticks_ ? state_.ticks + 1 : most_ticks_;
     advance(on, off);
     return {.phase = state_.phase, .falling = steep && state_.phase != CutPhase::kAir};
   }
@@ -92,7 +92,8 @@ class CutState {
   explicit constexpr CutState(const Config& config) noexcept
       : config_(config),
         entry_ticks_(whole_ticks(config.entry_s, config.period_s)),
-        lost_ticks_(whole_ticks(config.lost_s, config.period_s)) {}
+        lost_ticks_(whole_ticks(config.lost_s, config.period_s)),
+        most_ticks_(lost_ticks_ + entry_ticks_ + 1) {}
 
   // The fewest whole periods that last at least `time_s`, but for a thousandth of a period: 0.5 s
   // of 0.05 s are 10 ticks although their quotient in single precision may be above 10.
@@ -135,6 +136,7 @@ class CutState {
   Config config_;
   std::uint32_t entry_ticks_;
   std::uint32_t lost_ticks_;
+  std::uint32_t most_ticks_;  // that tell anything
   State state_{};
 };
 

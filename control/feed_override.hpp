@@ -92,33 +92,26 @@ class FeedOverride {
     return FeedOverride{config};
   }
 
-  [[nodiscard]] constexpr Output step(const Input& input) noexcept {
+  [[nodiscard]] [[gnu::always_inline]] constexpr Output step(const Input& input) noexcept {
     std::uint32_t limits = kNoLimit;
-    float target_pct = state_.position_pct;
-    const float high_pct = narrowed_high(input.ceiling_pct);
-    const float low_pct = narrowed_low(input.floor_pct, high_pct);
-    const bool may_rise = input.may_rise && input.ceiling_pct >= 0.0F;
-    if (input.wanted_pct >= -kLargest && input.wanted_pct <= kLargest) {
-      target_pct = std::clamp(input.wanted_pct, low_pct, high_pct);  // (C8)
-      if (input.wanted_pct < low_pct) limits |= kFloorLimit;
-      if (input.wanted_pct > high_pct) limits |= kCeilingLimit;
+    const float before_pct = state_.position_pct;
+    float position_pct = before_pct;
+    if (__builtin_fabsf(input.wanted_pct) <= kLargest) {
+      const float high_pct = narrowed_high(input.ceiling_pct);
+      const float low_pct = narrowed_low(input.floor_pct, high_pct);
+      position_pct = clamped(input.wanted_pct, low_pct, high_pct, kFloorLimit, kCeilingLimit,
+                             limits);  // (C8)
     } else {
       limits |= kNotFinite;
     }
-
-    const float up_pct = state_.position_pct + slew_up_pct_;
-    const float down_pct = state_.position_pct - slew_down_pct_;
-    if (target_pct > up_pct) limits |= kSlewUpLimit;
-    if (target_pct < down_pct) limits |= kSlewDownLimit;
-    float position_pct = std::clamp(target_pct, down_pct, up_pct);  // (C9)
-
-    const auto sent_pct = static_cast<float>(state_.sent_pct);
-    if (!may_rise && position_pct > state_.position_pct) {
+    position_pct = clamped(position_pct, before_pct - slew_down_pct_, before_pct + slew_up_pct_,
+                           kSlewDownLimit, kSlewUpLimit, limits);  // (C9)
+    if (position_pct > before_pct && !(input.may_rise && input.ceiling_pct >= 0.0F)) {
       limits |= kRiseForbidden;
-      position_pct = state_.position_pct;
+      position_pct = before_pct;
     }
-    if (const float distance_pct = position_pct - sent_pct;
-        distance_pct > keep_pct_ || distance_pct < -keep_pct_) {
+    const auto sent_pct = static_cast<float>(state_.sent_pct);
+    if (__builtin_fabsf(position_pct - sent_pct) > keep_pct_) {
       state_.sent_pct = rounded(position_pct);  // (C10)
     }
     state_.position_pct = position_pct;
@@ -146,6 +139,21 @@ class FeedOverride {
         slew_down_pct_(config.slew_down_pct_s * config.period_s) {
     state_.position_pct = std::clamp(config.initial_pct, lowest_pct_, highest_pct_);
     state_.sent_pct = rounded(state_.position_pct);
+  }
+
+  // std::clamp, saying which end acted.
+  [[nodiscard]] static constexpr float clamped(float value, float low, float high,
+                                               OverrideLimit at_low, OverrideLimit at_high,
+                                               std::uint32_t& limits) noexcept {
+    if (value < low) {
+      limits |= at_low;
+      return low;
+    }
+    if (value > high) {
+      limits |= at_high;
+      return high;
+    }
+    return value;
   }
 
   // The outermost steps within what is configured and what this step allows.

@@ -82,30 +82,11 @@ class ForceInput {
     return ForceInput{config};
   }
 
-  [[nodiscard]] constexpr Output step(const Input& input) noexcept {
-    ForceRefusal refusal = refuse(input);
-    if (refusal == ForceRefusal::kNone) {
-      state_.refused_ticks = 0;
-      state_.good_ticks = std::min(state_.good_ticks + 1, kTicksLimit);
-      if (state_.outcome == ForceOutcome::kLost && state_.good_ticks < config_.recover_ticks) {
-        refusal = ForceRefusal::kRecovering;
-      } else {
-        state_.outcome = ForceOutcome::kFresh;
-        state_.force_n = std::clamp(input.force_n, 0.0F, config_.highest_n);
-        state_.force_sigma_n = std::min(input.force_sigma_n, config_.highest_n);
-      }
-    } else {
-      state_.good_ticks = 0;
-      state_.refused_ticks = std::min(state_.refused_ticks + 1, kTicksLimit + 1);
-      if (state_.outcome != ForceOutcome::kLost) {
-        state_.outcome =
-            state_.refused_ticks > config_.hold_ticks ? ForceOutcome::kLost : ForceOutcome::kHeld;
-      }
-    }
-    return {.force_n = state_.force_n,
-            .force_sigma_n = state_.force_sigma_n,
-            .outcome = state_.outcome,
-            .refusal = refusal};
+  [[nodiscard]] [[gnu::always_inline]] constexpr Output step(const Input& input) noexcept {
+    if (is_usual(input)) [[likely]]
+      return take(input.force_n, input.force_sigma_n);
+    const Input copy = input;  // so that the usual one need not be in memory
+    return step_unusual(copy);
   }
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
@@ -118,11 +99,51 @@ class ForceInput {
 
   explicit constexpr ForceInput(const Config& config) noexcept : config_(config) {}
 
+  // Nothing to refuse and nothing to clamp.
+  [[nodiscard]] constexpr bool is_usual(const Input& input) const noexcept {
+    const auto in_range = [this](float value) {
+      return value >= 0.0F && value <= config_.highest_n;
+    };
+    return input.valid && input.age_ticks <= config_.stale_ticks && in_range(input.force_n) &&
+           in_range(input.force_sigma_n);
+  }
+
+  [[nodiscard]] constexpr Output step_unusual(const Input& input) noexcept {
+    const ForceRefusal refusal = refuse(input);
+    if (refusal != ForceRefusal::kNone) return do_without(refusal);
+    return take(std::clamp(input.force_n, 0.0F, config_.highest_n),
+                std::min(input.force_sigma_n, config_.highest_n));
+  }
+  [[gnu::always_inline]] constexpr Output take(float force_n, float force_sigma_n) noexcept {
+    state_.refused_ticks = 0;
+    if (state_.outcome == ForceOutcome::kLost && ++state_.good_ticks < config_.recover_ticks)
+      return answer(ForceRefusal::kRecovering);
+    state_.outcome = ForceOutcome::kFresh;
+    state_.force_n = force_n;
+    state_.force_sigma_n = force_sigma_n;
+    return answer(ForceRefusal::kNone);
+  }
+  constexpr Output do_without(ForceRefusal refusal) noexcept {
+    state_.good_ticks = 0;
+    state_.refused_ticks = std::min(state_.refused_ticks + 1, kTicksLimit + 1);
+    if (state_.outcome != ForceOutcome::kLost) {
+      state_.outcome =
+          state_.refused_ticks > config_.hold_ticks ? ForceOutcome::kLost : ForceOutcome::kHeld;
+    }
+    return answer(refusal);
+  }
+  [[nodiscard]] constexpr Output answer(ForceRefusal refusal) const noexcept {
+    return {.force_n = state_.force_n,
+            .force_sigma_n = state_.force_sigma_n,
+            .outcome = state_.outcome,
+            .refusal = refusal};
+  }
+
   // Conditions are written so that NaN is refused.
   [[nodiscard]] constexpr ForceRefusal refuse(const Input& input) const noexcept {
     if (!input.valid) return ForceRefusal::kMissing;
     if (input.age_ticks > config_.stale_ticks) return ForceRefusal::kStale;
-    if (!(input.force_n >= -kLargest && input.force_n <= kLargest)) return ForceRefusal::kNotFinite;
+    if (!(__builtin_fabsf(input.force_n) <= kLargest)) return ForceRefusal::kNotFinite;
     if (!(input.force_sigma_n >= 0.0F && input.force_sigma_n <= kLargest))
       return ForceRefusal::kSigma;
     const float excused_n = std::min(3.0F * std::min(input.force_sigma_n, config_.highest_n),

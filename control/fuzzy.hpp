@@ -127,16 +127,22 @@ class FuzzyPi {
     return strength;
   }
 
-  // The nine exchanges that put five values in order.
-  static constexpr void sort(std::array<float, 5>& values) noexcept {
-    auto& [a, b, c, d, e] = values;
+  // Where the union has a corner between two labels, in order, and the end: where a set leaves its
+  // slope, where one slope meets the other's plateau, where slopes meet. Of a strength and what it
+  // lacks of 1, one is at most 0.5 and the other at least: four exchanges put them in order.
+  [[nodiscard]] static constexpr std::array<float, 6> corners(float falling,
+                                                              float rising) noexcept {
     const auto order = [](float& low, float& high) {
       const float less = high < low ? high : low;
       high = high < low ? low : high;
       low = less;
     };
-    order(a, d), order(b, e), order(a, c), order(b, d), order(a, b);
-    order(c, e), order(b, c), order(d, e), order(c, d);
+    float a = falling;
+    float b = rising;
+    float c = 1.0F - rising;
+    float d = 1.0F - falling;
+    order(a, d), order(b, c), order(a, b), order(c, d);
+    return {a, b, 0.5F, c, d, 1.0F};
   }
 
   // (C60), in labels. One rule at least has half its strength: the area is never 0.
@@ -149,21 +155,26 @@ class FuzzyPi {
       if (!(falling + rising > 0.0F)) continue;
       const auto start = static_cast<float>(n) - static_cast<float>(kOuter + 1);
       const auto height = [&](float t) {
-        return std::max(std::min(falling, 1.0F - t), std::min(rising, t));
+        const float slope = 1.0F - t;
+        const float fallen = falling < slope ? falling : slope;
+        const float risen = rising < t ? rising : t;
+        return fallen < risen ? risen : fallen;
       };
-      // Where a set leaves its slope, where one slope meets the other's plateau, where slopes meet.
-      std::array<float, 5> corner{falling, 1.0F - falling, rising, 1.0F - rising, 0.5F};
-      sort(corner);
       float left = 0.0F;
-      for (std::size_t k = 0; k <= corner.size(); ++k) {
-        const float right = k < corner.size() ? corner[k] : 1.0F;
+      float height_left = falling;  // at a label: that set alone
+      float moment_left = start * falling;
+      for (const float right : corners(falling, rising)) {
+        if (!(right > left)) continue;  // nothing is in between
         const float middle = 0.5F * (left + right);
         const float width = right - left;
-        area += 0.5F * width * (height(left) + height(right));
-        moment += width / 6.0F *
-                  ((start + left) * height(left) + 4.0F * (start + middle) * height(middle) +
-                   (start + right) * height(right));
+        const float height_right = height(right);
+        const float moment_right = (start + right) * height_right;
+        area += 0.5F * width * (height_left + height_right);
+        moment +=
+            width / 6.0F * (moment_left + 4.0F * (start + middle) * height(middle) + moment_right);
         left = right;
+        height_left = height_right;
+        moment_left = moment_right;
       }
     }
     return moment / area;

@@ -9,6 +9,7 @@ auto LawSet::make(const Config& config) noexcept -> std::expected<LawSet, Config
   return LawSet{config};
 }
 
+// The visitor sees the law in charge.
 template <class Set, class Visitor>
 auto LawSet::visit(Set& set, const Visitor& visitor) {
   switch (set.in_charge_) {
@@ -40,7 +41,7 @@ template <class L>
 
 }  // namespace
 
-auto LawSet::step(const Input& input) noexcept -> Output {
+auto LawSet::step_any(const Input& input) noexcept -> Output {
   if (joining_ && input.mode == LawMode::kHold) return law_answer(input.override_applied_pct);
   if (joining_) join(input);
   return step_in_charge(input);

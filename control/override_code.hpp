@@ -47,6 +47,7 @@ inline constexpr std::array<std::string_view, kOverrideCodeCount> kOverrideCodeN
 
 // The byte for `percent`, or for the highest percentage below it that the code can say. (C12)
 [[nodiscard]] constexpr std::uint8_t encode(OverrideCode code, std::uint8_t percent) noexcept {
+  if (code == OverrideCode::kBinary) return percent;  // it can say everything
   const unsigned value = std::min(percent, highest_pct(code));
   switch (code) {
     case OverrideCode::kBinary:

@@ -77,20 +77,10 @@ class PiController {
     return PiController{config};
   }
 
-  [[nodiscard]] constexpr Output step(const Input& input) noexcept {
-    if (!supervise_) return law_answer(velocity_form_pct(state_, input, gains_));
-    GainSupervision& seen = state_.supervision;
-    seen.observe(input);
-    const float scale = seen.scale_ratio(highest_process_gain_n_pct_);
-    const float override_pct =
-        velocity_form_pct(state_, input,
-                          {.proportional_pct_n = scale * gains_.proportional_pct_n,
-                           .integral_pct_n = scale * gains_.integral_pct_n,
-                           .tracking_ratio = gains_.tracking_ratio});
-    return {.override_pct = override_pct,
-            .process_gain_n_pct = seen.highest_n_pct(),
-            .process_gain_sigma_ratio = seen.sigma_ratio(),
-            .stability_margin_ratio = seen.margin_ratio(highest_process_gain_n_pct_)};
+  [[nodiscard]] [[gnu::always_inline]] constexpr Output step(const Input& input) noexcept {
+    if (supervise_) [[unlikely]]
+      return step_supervised(input);
+    return law_answer(velocity_form_pct(state_, input, gains_));
   }
 
   // In charge after another law: as make() left it.
@@ -110,6 +100,21 @@ class PiController {
                    config.form == Form::kVelocity ? 1.0F : config.period_s / config.tracking_s},
         highest_process_gain_n_pct_(config.highest_process_gain_n_pct()),
         supervise_(config.supervise) {}
+
+  [[gnu::always_inline]] constexpr Output step_supervised(const Input& input) noexcept {
+    GainSupervision& seen = state_.supervision;
+    seen.observe(input);
+    const float scale = seen.scale_ratio(highest_process_gain_n_pct_);
+    const float override_pct =
+        velocity_form_pct(state_, input,
+                          {.proportional_pct_n = scale * gains_.proportional_pct_n,
+                           .integral_pct_n = scale * gains_.integral_pct_n,
+                           .tracking_ratio = gains_.tracking_ratio});
+    return {.override_pct = override_pct,
+            .process_gain_n_pct = seen.highest_n_pct(),
+            .process_gain_sigma_ratio = seen.sigma_ratio(),
+            .stability_margin_ratio = seen.margin_ratio(highest_process_gain_n_pct_)};
+  }
 
   VelocityGains gains_;
   float highest_process_gain_n_pct_;

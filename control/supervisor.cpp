@@ -1,6 +1,7 @@
 #include "control/supervisor.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "control/supervisor_table.hpp"
 
@@ -14,6 +15,28 @@ using S = SupervisorState;
 }
 constexpr StateSet kLatched = from_to(S::kLinkLost, S::kDead);
 
+// By state; a hold by its cause, the monitor and the bus have their say in Supervisor::outward().
+constexpr auto kOutward = [] {
+  std::array<Supervisor::Outward, kSupervisorStateCount> all{};
+  for (unsigned k = 0; k < all.size(); ++k) {
+    const auto state = static_cast<S>(k);
+    all[k] = {.controlling = is_in(state, detail::kInControl),
+              .alive = is_in(state, detail::kOnTheLines),
+              .alarm = is_in(state, kLatched),
+              .silent = is_in(state, only(S::kBoot) | only(S::kSelfTest) | only(S::kDead)),
+              .permission = kEverything};
+    all[k].permission.enable = is_in(state, detail::kInControl);
+    all[k].permission.may_rise = is_in(state, from_to(S::kReady, S::kControl));
+  }
+  return all;
+}();
+static_assert(from_to(S::kHold, S::kDead) == (only(S::kHold) | kLatched));
+
+// By value: std::min takes addresses, and what is smaller than a register goes over the stack.
+[[nodiscard]] constexpr std::uint32_t lesser(std::uint32_t a, std::uint32_t b) noexcept {
+  return a < b ? a : b;
+}
+
 // Rounded; 0..254.
 [[nodiscard]] constexpr std::uint8_t byte(float percent) noexcept {
   return static_cast<std::uint8_t>(percent + 0.5F);
@@ -22,7 +45,8 @@ constexpr StateSet kLatched = from_to(S::kLinkLost, S::kDead);
 }  // namespace
 
 // The fall of a latched state, from its beginning.
-void Supervisor::enter(SupervisorState before, bool force_over) noexcept {
+[[gnu::always_inline]] inline void Supervisor::enter(SupervisorState before,
+                                                     bool force_over) noexcept {
   const S now = state_.state;
   if (before == S::kProtect) state_.forces_over = 0;
   if (!is_in(now, kLatched)) {
@@ -46,14 +70,15 @@ void Supervisor::enter(SupervisorState before, bool force_over) noexcept {
 }
 
 // In kHold by these the controller is off: what it would see is not the force of a cut.
-bool Supervisor::controller_off() const noexcept {
+[[gnu::always_inline]] inline bool Supervisor::controller_off() const noexcept {
   return state_.reason == Reason::kInhibited || state_.reason == Reason::kThreading;
 }
 
-std::uint8_t Supervisor::following(std::uint8_t controller_pct) const noexcept {
-  const std::uint8_t last_pct = state_.override_pct;
-  const std::uint8_t neutral_pct = byte(config_.neutral_pct);
-  const std::uint8_t wanted_pct = std::min<std::uint8_t>(controller_pct, 254);
+[[gnu::always_inline]] inline std::uint32_t Supervisor::following(
+    std::uint32_t controller_pct) const noexcept {
+  const std::uint32_t last_pct = state_.override_pct;
+  const std::uint32_t neutral_pct = neutral_pct_;
+  const std::uint32_t wanted_pct = lesser(controller_pct, 254);
   switch (state_.state) {
     case S::kBoot:
     case S::kSelfTest:
@@ -61,11 +86,11 @@ std::uint8_t Supervisor::following(std::uint8_t controller_pct) const noexcept {
       return last_pct;
     case S::kReady:
     case S::kMonitor:
-      return std::min(wanted_pct, std::max(last_pct, neutral_pct));
+      return lesser(wanted_pct, last_pct > neutral_pct ? last_pct : neutral_pct);
     case S::kControl:
       return wanted_pct;
     case S::kHold:
-      return std::min(last_pct, controller_off() ? neutral_pct : wanted_pct);
+      return lesser(last_pct, controller_off() ? neutral_pct : wanted_pct);
     case S::kLinkLost:
     case S::kProtect:
     case S::kSafe:
@@ -75,56 +100,51 @@ std::uint8_t Supervisor::following(std::uint8_t controller_pct) const noexcept {
   return byte(state_.position_pct);
 }
 
-Permission Supervisor::permission() const noexcept {
-  const bool hold = state_.state == S::kHold;
-  const bool idle = is_in(state_.state, from_to(S::kReady, S::kMonitor));
-  const bool control = state_.state == S::kControl;
-  Permission permission = kEverything;
-  permission.enable = control || (hold && !controller_off());
-  permission.may_rise = control || idle;
-  if (hold || is_in(state_.state, kLatched))
-    permission.ceiling_pct = static_cast<float>(state_.override_pct);
-  return permission;
+[[gnu::always_inline]] inline auto Supervisor::outward(bool bus_down) const noexcept -> Outward {
+  const S now = state_.state;
+  Outward outward = kOutward[static_cast<unsigned>(now)];
+  if (now == S::kMonitor && state_.reason == Reason::kForceLimit) outward.alarm = true;
+  if (bus_down) outward.silent = true;
+  if (now >= S::kHold) {
+    if (now == S::kHold && controller_off()) outward.permission.enable = false;
+    outward.permission.ceiling_pct = static_cast<float>(state_.override_pct);
+  }
+  return outward;
 }
 
 auto Supervisor::step(const Input& input) noexcept -> Output {
-  note_ages(input);
-  note_force(input);
-  note_missed(input.missed_ticks);
-  const EventSet causes = holds(input);
-  state_.calm_steps = causes == 0 ? std::min(state_.calm_steps + 1, kNever) : 0;
-  const EventSet events =
-      faults(input) | causes | requests(input) | when(state_.calm_steps >= release_steps_, kCalm);
+  const EventSet events = this->events(input);
+  const Transition* const row = transition(state_.state, events);
+  if (row != nullptr || is_in(state_.state, kLatched)) [[unlikely]]
+    return step_on(row, events, input);
+  state_.override_pct = static_cast<std::uint8_t>(following(input.override_pct));
+  state_.lows = static_cast<std::uint8_t>(~buttons(input) & kAllButtons);
+  return {{outward(input.bus_down)}, state_.state, state_.reason, state_.override_pct, false};
+}
 
+// By a row of the table, or in a state whose override may fall.
+auto Supervisor::step_on(const Transition* row, EventSet events, const Input& input) noexcept
+    -> Output {
   const S before = state_.state;
   const Reason reason = state_.reason;
-  if (const Transition* row = transition(before, events); row != nullptr) {
+  if (row != nullptr) {
     state_.state = row->next;
     state_.reason = row->reason;
   }
   enter(before, (events & kForceOver) != 0);
   const bool moved = state_.state != before;
-  const std::uint8_t last_pct = state_.override_pct;
-  const std::uint8_t wanted_pct = following(input.override_pct);
-  state_.override_pct = moved ? std::min(wanted_pct, last_pct) : wanted_pct;
+  const std::uint32_t wanted_pct = following(input.override_pct);
+  state_.override_pct =
+      static_cast<std::uint8_t>(moved ? lesser(wanted_pct, state_.override_pct) : wanted_pct);
 
-  const bool arm_low = !input.arm && (before != S::kLinkLost || (events & kLinkOk) != 0);
-  const std::uint32_t lows =
-      when(arm_low, kArmBit) | when(!input.control, kControlBit) | when(!input.reset, kResetBit);
+  std::uint32_t lows = ~buttons(input) & kAllButtons;
+  if (before == S::kLinkLost && (events & kLinkOk) == 0) lows &= ~kArmBit;
   state_.lows = static_cast<std::uint8_t>(moved ? 0 : lows);
-
-  const S now = state_.state;
-  const bool starting = now == S::kBoot || now == S::kSelfTest;
-  return {
-      .state = now,
-      .reason = state_.reason,
-      .override_pct = state_.override_pct,
-      .controlling = is_in(now, detail::kInControl),
-      .alive = is_in(now, detail::kOnTheLines),
-      .alarm = is_in(now, kLatched) || (now == S::kMonitor && state_.reason == Reason::kForceLimit),
-      .silent = starting || now == S::kDead || input.bus_down,
-      .permission = permission(),
-      .changed = moved || state_.reason != reason};
+  return {{outward(input.bus_down)},
+          state_.state,
+          state_.reason,
+          state_.override_pct,
+          moved || state_.reason != reason};
 }
 
 }  // namespace cutforce::control

@@ -75,6 +75,8 @@ enum class Reason : std::uint8_t {
 };
 inline constexpr unsigned kReasonCount = 16;
 
+struct Transition;  // supervisor_table.hpp
+
 enum class SupervisorMode : std::uint8_t {
   kAdvise,   // never beyond kMonitor
   kControl,  // the CNC may give control
@@ -126,49 +128,54 @@ class Supervisor {
     // The board's own health
     bool self_test_done;
     bool self_test_passed;
-    bool checks_passed;          // configuration, lines and bus are as the machine file says
-    bool checks_done = true;     // false: it is too early to tell, and nothing has failed
-    bool output_failed;          // byte or frame could not be handed over
-    bool foreign;                // our own identifier, from another node
-    bool stop;                   // the service ends: to kDead, for good
-    std::uint32_t missed_ticks;  // since the last step
-    // The link
-    bool machine_state_new;  // an accepted frame since the last step
+    bool checks_passed;       // configuration, lines and bus are as the machine file says
+    bool checks_done = true;  // false: it is too early to tell, and nothing has failed
+    // Eight that are false where all is well: read as two words, see in_order()
+    bool output_failed;  // byte or frame could not be handed over
+    bool foreign;        // our own identifier, from another node
+    bool stop;           // the service ends: to kDead, for good
     bool bus_down;
+    bool inhibit;          // of the line, or of a frame
+    bool threading;        // as the CNC says
+    bool signals_refused;  // the health monitor will not have them
+    bool reversed;         // the spindle turns the other way than it did
     // What the CNC says; levels, of the last accepted frame
     bool arm;
     bool control;
     bool reset;
-    bool inhibit;  // of the line, or of a frame
-    bool threading;
     bool spindle_at_speed;
     bool feeding;
-    // The samples and what the loop made of them
+    // What is new since the last step
+    bool machine_state_new;  // an accepted frame
     bool sample_new;
-    bool signals_refused;       // the health monitor will not have them
-    bool reversed;              // the spindle turns the other way than it did
-    bool force_new;             // a force estimate since the last step
+    bool force_new;  // a force estimate
+    std::uint32_t missed_ticks;
     float force_n;              // of that estimate
     float force_limit_n;        // 0: there is none
     std::uint8_t override_pct;  // the controller's, as it would be sent
   };
 
-  struct Output {
-    SupervisorState state;
-    Reason reason;
-    std::uint8_t override_pct;  // what goes out
-    bool controlling;           // the override is the controller's
-    bool alive;                 // whether the alive line may toggle
+  // What a state says to the world.
+  struct Outward {
+    bool controlling;  // the override is the controller's
+    bool alive;        // whether the alive line may toggle
     bool alarm;
     bool silent;            // nothing more on the bus
     Permission permission;  // for the next control tick; floor and reference are neutral here
-    bool changed;           // the state or the reason is another than before this step
+  };
+
+  struct Output : Outward {
+    SupervisorState state;
+    Reason reason;
+    std::uint8_t override_pct;  // what goes out
+    bool changed;               // the state or the reason is another than before this step
   };
 
   static constexpr std::uint32_t kNever = 1'000'000'000;  // an age; steps
   static constexpr std::uint32_t kArmBit = 1;
   static constexpr std::uint32_t kControlBit = 2;
   static constexpr std::uint32_t kResetBit = 4;
+  static constexpr std::uint32_t kAllButtons = kArmBit | kControlBit | kResetBit;
 
   struct State {
     SupervisorState state;
@@ -197,25 +204,40 @@ class Supervisor {
   [[nodiscard]] Output step(const Input& input) noexcept;
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
-  void restore(const State& state) noexcept { state_ = state; }
+  void restore(const State& state) noexcept {
+    state_ = state;
+    sum_missed();
+  }
 
  private:
   explicit constexpr Supervisor(const Config& config) noexcept;
 
   [[nodiscard]] constexpr std::uint32_t steps(float time_s) const noexcept;
+  [[nodiscard]] Output step_on(const Transition* row, std::uint32_t events,
+                               const Input& input) noexcept;
+  // In supervisor_events.cpp: what happens in this step, EventSet of supervisor_table.hpp.
+  [[nodiscard]] std::uint32_t events(const Input& input) noexcept;
+  [[nodiscard]] std::uint32_t all_events(const Input& input, bool overran) noexcept;
+  [[nodiscard]] bool in_order(const Input& input, bool overran) const noexcept;
   void note_ages(const Input& input) noexcept;
-  void note_force(const Input& input) noexcept;
-  void note_missed(std::uint32_t missed_ticks) noexcept;
-  [[nodiscard]] bool overran() const noexcept;
+  [[nodiscard]] bool note_missed(std::uint32_t missed_ticks) noexcept;
+  void slide_window(std::uint32_t missed_ticks) noexcept;
+  void sum_missed() noexcept;
   [[nodiscard]] bool protect_clear(const Input& input) const noexcept;
   [[nodiscard]] bool safe_clear(const Input& input) const noexcept;
   [[nodiscard]] std::uint32_t faults(const Input& input) const noexcept;
-  [[nodiscard]] std::uint32_t holds(const Input& input) const noexcept;
+  [[nodiscard]] std::uint32_t tests(const Input& input) const noexcept;
+  [[nodiscard]] std::uint32_t holds(const Input& input, bool overran) const noexcept;
   [[nodiscard]] std::uint32_t requests(const Input& input) const noexcept;
+  // Which are pressed now, bit by bit.
+  [[nodiscard]] static constexpr std::uint32_t buttons(const Input& input) noexcept {
+    return (input.arm ? kArmBit : 0U) | (input.control ? kControlBit : 0U) |
+           (input.reset ? kResetBit : 0U);
+  }
   void enter(SupervisorState before, bool force_over) noexcept;
-  [[nodiscard]] std::uint8_t following(std::uint8_t controller_pct) const noexcept;
+  [[nodiscard]] std::uint32_t following(std::uint32_t controller_pct) const noexcept;
   [[nodiscard]] bool controller_off() const noexcept;
-  [[nodiscard]] Permission permission() const noexcept;
+  [[nodiscard]] Outward outward(bool bus_down) const noexcept;
 
   Config config_;
   std::uint32_t link_steps_;
@@ -224,6 +246,9 @@ class Supervisor {
   std::uint32_t release_steps_;
   std::uint32_t window_part_steps_;
   float missed_most_;
+  std::uint32_t edges_allowed_;  // of the buttons; advising, there is none of kControlBit
+  std::uint8_t neutral_pct_;
+  bool missed_too_many_ = false;  // in the window: the sum of State::missed against missed_most_
   State state_{};
 };
 
@@ -235,15 +260,17 @@ constexpr auto Supervisor::make(const Config& config) noexcept
 
 constexpr Supervisor::Supervisor(const Config& config) noexcept
     : config_(config),
-      link_steps_(steps(config.link_timeout_s)),
+      link_steps_(config.link_required ? steps(config.link_timeout_s) : kNever),
       samples_steps_(steps(config.samples_timeout_s)),
       estimate_steps_(steps(config.estimate_timeout_s)),
       release_steps_(steps(config.hold_release_s)),
       window_part_steps_(std::max<std::uint32_t>(steps(config.overrun_window_s) / 8, 1U)),
-      missed_most_(config.overrun_ratio * static_cast<float>(steps(config.overrun_window_s))) {
+      missed_most_(config.overrun_ratio * static_cast<float>(steps(config.overrun_window_s))),
+      edges_allowed_(config.mode == SupervisorMode::kControl ? kAllButtons : kArmBit | kResetBit),
+      neutral_pct_(static_cast<std::uint8_t>(config.neutral_pct + 0.5F)) {
   state_ = {.state = SupervisorState::kBoot,
             .reason = Reason::kNone,
-            .override_pct = static_cast<std::uint8_t>(config.neutral_pct + 0.5F),
+            .override_pct = neutral_pct_,
             .lows = 0,
             .controlled = 0,
             .forces_over = 0,

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <string_view>
 
@@ -172,9 +173,33 @@ inline constexpr auto kTransitions = std::to_array<Transition>({
     {only(SupervisorState::kSafe), kResetEdge | kSafeClear, SupervisorState::kReady, Reason::kNone},
 });
 
+namespace detail {
+
+// One event of each row that leads from the state, a person's where it has one: while none of them
+// has happened, no row is taken. 1 above all events stands for the row that needs none.
+inline constexpr EventSet kNoEvent = 1U << kEventCount;
+[[nodiscard]] constexpr EventSet triggers(SupervisorState state) noexcept {
+  EventSet events = 0;
+  for (const Transition& row : kTransitions) {
+    if ((row.states & only(state)) != 0)
+      events |= row.events == kAlways ? kNoEvent : std::bit_floor(row.events);
+  }
+  return events;
+}
+inline constexpr auto kTriggers = [] {
+  std::array<EventSet, kSupervisorStateCount> all{};
+  for (unsigned k = 0; k < all.size(); ++k) all[k] = triggers(static_cast<SupervisorState>(k));
+  return all;
+}();
+
+}  // namespace detail
+
 // The row that is taken, or null.
 [[nodiscard]] constexpr const Transition* transition(SupervisorState state,
                                                      EventSet events) noexcept {
+  const EventSet triggers = detail::kTriggers[static_cast<unsigned>(state)];
+  if (((events | detail::kNoEvent) & triggers) == 0) [[likely]]
+    return nullptr;
   for (const Transition& row : kTransitions) {
     if ((row.states & only(state)) != 0 && (events & row.events) == row.events) return &row;
   }

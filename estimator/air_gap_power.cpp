@@ -1,6 +1,5 @@
 #include "estimator/air_gap_power.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -79,23 +78,6 @@ bool AirGapPower::add_run(std::span<const MotorSample> samples, float electrical
     sum<Mode::kFixedPowerFactor>(samples, electrical_rad_s);
   }
   return state_.sample >= config_.samples_per_window;
-}
-
-auto AirGapPower::close_window() noexcept -> Output {
-  const float mean = 0.5F * state_.airgap_w / state_.weight;
-  const float square = 0.5F * state_.current_square_a2 / state_.weight;
-  const Output output{
-      .airgap_power_w = mean,
-      .input_power_w = mean + loss_ohm_ * square,
-      .current_square_a2 = square,
-      // (E25): scatter from first differences, which a load step within the window hardly moves.
-      .noise_variance_w2 = 0.5F * state_.difference_square_w2 / (state_.weight * state_.weight)};
-  state_.sample = 0;
-  state_.weight = 0.0F;
-  state_.airgap_w = 0.0F;
-  state_.current_square_a2 = 0.0F;
-  state_.difference_square_w2 = 0.0F;
-  return output;
 }
 
 }  // namespace cutforce::estimator

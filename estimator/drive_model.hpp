@@ -57,12 +57,15 @@ class DriveModel {
   [[nodiscard]] constexpr Output step(const Input& input) noexcept {
     const float before = state_.windows == 0 ? input.speed_rad_s : state_.speed_rad_s;
     const float change = input.speed_rad_s - before;
-    const float per_b = gain(input.viscous_nm_s_rad);
+    if (input.viscous_nm_s_rad != viscous_nm_s_rad_) [[unlikely]] {
+      viscous_nm_s_rad_ = input.viscous_nm_s_rad;
+      per_b_ = gain(input.viscous_nm_s_rad);
+    }
     const float inertia = config_.inertia_kg_m2 * change / config_.period_s;
     state_ = {.speed_rad_s = input.speed_rad_s, .windows = 1};
-    return {.external_torque_nm =
-                input.airgap_torque_nm - per_b * change - input.viscous_nm_s_rad * before,  // (E30)
-            .load_torque_nm = input.airgap_torque_nm - inertia,                             // (E32)
+    return {.external_torque_nm = input.airgap_torque_nm - per_b_ * change -
+                                  input.viscous_nm_s_rad * before,  // (E30)
+            .load_torque_nm = input.airgap_torque_nm - inertia,     // (E32)
             .inertia_torque_nm = inertia};
   }
 
@@ -84,9 +87,13 @@ class DriveModel {
   constexpr void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit constexpr DriveModel(const Config& config) noexcept : config_(config) {}
+  explicit constexpr DriveModel(const Config& config) noexcept : config_(config) {
+    per_b_ = gain(viscous_nm_s_rad_);
+  }
 
   Config config_;
+  float viscous_nm_s_rad_ = 0.0F;  // of the last window, and its 1/b: B changes at idle only
+  float per_b_;
   State state_{};
 };
 

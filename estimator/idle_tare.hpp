@@ -119,30 +119,41 @@ class IdleTare {
 
   // One window.
   [[nodiscard]] Output step(const Input& input) noexcept;
+  [[nodiscard]] Output step_inlined(const Input& input) noexcept;  // idle_tare_step.hpp
 
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
-  constexpr void restore(const State& state) noexcept { state_ = state; }
+  void restore(const State& state) noexcept {
+    state_ = state;
+    note_noise();
+  }
 
  private:
+  static constexpr float kRestMemory = 8.0F;  // windows in the mean of the torque at rest
+
   explicit constexpr IdleTare(const Config& config) noexcept;
 
-  [[nodiscard]] float idle_torque(float speed_rad_s) const noexcept;
-  [[nodiscard]] float band() const noexcept;
-  [[nodiscard]] float reach(const Input& input) const noexcept;
+  void note_noise() noexcept;
+  [[nodiscard]] float idle_torque(float speed_rad_s) const noexcept {
+    return state_.coulomb_nm + state_.viscous_nm_s_rad * speed_rad_s;  // (E44)
+  }
+  [[nodiscard]] float reach(float speed_rad_s) const noexcept;
   [[nodiscard]] float recent_mean() const noexcept;
   void rest(const Input& input) noexcept;
   void decide(const Input& input) noexcept;
-  [[nodiscard]] bool touches(const Input& input) const noexcept;
+  [[nodiscard]] bool touches(Input input) const noexcept;
   void decide_alone(const Input& input) noexcept;
   void enter_cut(float above_idle_nm) noexcept;
   void stand_still() noexcept;
-  void tare(const Input& input) noexcept;
+  void tare(Input input) noexcept;  // by value: what is inlined stays in registers
   void close_idle() noexcept;
   void regress() noexcept;
   [[nodiscard]] Output publish(const Input& input, bool taring) const noexcept;
 
   Config config_;
   std::uint32_t wait_windows_;
+  float gain_;                   // of the tare, a window
+  float noise_sigma_nm_ = 0.0F;  // of State::noise_variance_nm2, which moves in idle only
+  float band_nm_;                // likewise; at its upper limit until idle was seen
   State state_{};
 };
 
@@ -179,10 +190,11 @@ constexpr std::expected<void, IdleTare::ConfigError> IdleTare::Config::check() c
 
 constexpr IdleTare::IdleTare(const Config& config) noexcept
     : config_(config),
-      wait_windows_(static_cast<std::uint32_t>(config.wait_s / config.period_s + 0.5F)) {
+      wait_windows_(static_cast<std::uint32_t>(config.wait_s / config.period_s + 0.5F)),
+      gain_(config.period_s / (config.period_s + config.memory_s)),
+      band_nm_(config.band_most_nm) {
   state_.coulomb_nm = config.coulomb_nm;
   state_.viscous_nm_s_rad = config.viscous_nm_s_rad;
-  // Until idle was seen, the band is at its upper limit.
   state_.noise_variance_nm2 = config.band_most_nm * config.band_most_nm / 25.0F;
 }
 

@@ -73,8 +73,10 @@ class LoadFriction {
   }
 
   [[nodiscard]] Output step(const Input& input) const noexcept {
-    const float f = config_.linear_ratio.at(input.speed_rad_s);
-    const float g = config_.quadratic_1_nm.at(input.speed_rad_s);
+    const SpeedLines::Place place = linear_ratio_.place(input.speed_rad_s);
+    const float f = linear_ratio_.at(place);
+    const float g =
+        same_places_ ? quadratic_1_nm_.at(place) : quadratic_1_nm_.at(input.speed_rad_s);
     const float cutting = torque_without_load_friction(input.torque_nm, f, g);
     const float size = magnitude(cutting);
     return {.cutting_torque_nm = cutting,
@@ -82,9 +84,14 @@ class LoadFriction {
   }
 
  private:
-  explicit constexpr LoadFriction(const Config& config) noexcept : config_(config) {}
+  explicit constexpr LoadFriction(const Config& config) noexcept
+      : linear_ratio_(config.linear_ratio),
+        quadratic_1_nm_(config.quadratic_1_nm),
+        same_places_(linear_ratio_.has_places_of(quadratic_1_nm_)) {}
 
-  Config config_;
+  SpeedLines linear_ratio_;
+  SpeedLines quadratic_1_nm_;
+  bool same_places_;
 };
 
 static_assert(std::is_trivially_copyable_v<LoadFriction>);

@@ -90,12 +90,11 @@ class MeasuredPower {
   // One window.
   [[nodiscard]] Output step(const Input& input) noexcept {
     const float corrected = config_.scale_ratio * (input.meter_w - config_.offset_w);  // (E36)
-    const float power = config_.efficiency_ratio * corrected -
-                        config_.loss_w.at(input.speed_rad_s) -
+    const float power = config_.efficiency_ratio * corrected - loss_w_.at(input.speed_rad_s) -
                         config_.loss_quadratic_1_w * corrected * corrected;  // (E37)
     const float before = state_.windows == 0 ? power : state_.unbiased_w;
     const float slow = state_.windows == 0 ? power : state_.slow_w;
-    state_.slow_w = slow + config_.period_s / (config_.period_s + config_.lag_s) * (power - slow);
+    state_.slow_w = slow + slow_share_ * (power - slow);
     state_.unbiased_w = power;
     state_.windows = 1;
     return {.power_w = power - state_.bias_w, .sigma_w = sigma(power, power - before)};
@@ -116,18 +115,25 @@ class MeasuredPower {
   constexpr void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit constexpr MeasuredPower(const Config& config) noexcept : config_(config) {}
+  explicit constexpr MeasuredPower(const Config& config) noexcept
+      : config_(config),
+        loss_w_(config.loss_w),
+        slow_share_(config.period_s / (config.period_s + config.lag_s)),
+        noise_w2_(config.noise_w * config.noise_w),
+        behind_(config.lag_s / config.period_s * (config.lag_s / config.period_s)) {}
 
   // (E38)
   [[nodiscard]] float sigma(float power_w, float change_w) const noexcept {
-    const float per_change = config_.lag_s / config_.period_s;
-    const float noise = config_.noise_w * config_.noise_w;
-    const float behind = per_change * per_change * (change_w * change_w - 2.0F * noise);
+    const float behind = behind_ * (change_w * change_w - 2.0F * noise_w2_);
     const float model = config_.model_sigma_ratio * power_w;
-    return std::sqrt(noise + model * model + (behind > 0.0F ? behind : 0.0F));
+    return std::sqrt(noise_w2_ + model * model + (behind > 0.0F ? behind : 0.0F));
   }
 
   Config config_;
+  SpeedLines loss_w_;
+  float slow_share_;  // of the slow mean, a window
+  float noise_w2_;
+  float behind_;  // lag over period, squared
   State state_{};
 };
 

@@ -119,7 +119,7 @@ class SynchronousSpeed {
   [[nodiscard]] bool add(const MotorSample& sample) noexcept { return add_run({&sample, 1}); }
   // Samples of one window.
   [[nodiscard]] bool add_run(std::span<const MotorSample> samples) noexcept;
-  [[nodiscard]] Output close_window() noexcept;
+  [[nodiscard]] [[gnu::always_inline]] Output close_window() noexcept;
 
   // Drops the window and the flux so far. For gaps in the signals.
   constexpr void restart() noexcept { state_ = {}; }
@@ -134,14 +134,42 @@ class SynchronousSpeed {
                    (1.0F + 0.5F * config.flux_leak_rad_s * config.sample_period_s)),
         flux_gain_s_(0.5F * config.sample_period_s /
                      (1.0F + 0.5F * config.flux_leak_rad_s * config.sample_period_s)),
-        end_samples_(config.samples_per_window / 5) {}
+        end_samples_(config.samples_per_window / 5),
+        count_(static_cast<float>(config.samples_per_window)),
+        window_s_(count_ * config.sample_period_s),
+        end_pole_pairs_s_(static_cast<float>(end_samples_) * config.sample_period_s *
+                          config.pole_pairs),
+        least_square_a2_(count_ * config.minimum_current_a * config.minimum_current_a) {}
 
   Config config_;
   float flux_keep_;
   float flux_gain_s_;
   std::uint32_t end_samples_;
+  // Of a window: samples, length, length of its end times pole pairs, least sum of |i|^2.
+  float count_;
+  float window_s_;
+  float end_pole_pairs_s_;
+  float least_square_a2_;
   State state_{};
 };
+
+inline auto SynchronousSpeed::close_window() noexcept -> Output {
+  const float electrical = state_.angle_rad / window_s_;  // (E26)
+  const bool valid = magnitude(electrical) >= config_.minimum_electrical_rad_s &&
+                     state_.current_square_a2 >= least_square_a2_;
+  const float leak = valid ? config_.flux_leak_rad_s / electrical : 0.0F;
+  const Output output{.electrical_rad_s = electrical,
+                      .synchronous_rad_s = electrical / config_.pole_pairs,  // (E27)
+                      .synchronous_end_rad_s = state_.angle_end_rad / end_pole_pairs_s_,
+                      .flux_square_v2s2 = state_.flux_square_v2s2 / count_ * (1.0F + leak * leak),
+                      .valid = valid};
+  state_.angle_rad = 0.0F;
+  state_.angle_end_rad = 0.0F;
+  state_.flux_square_v2s2 = 0.0F;
+  state_.current_square_a2 = 0.0F;
+  state_.sample = 0;
+  return output;
+}
 
 static_assert(std::is_trivially_copyable_v<SynchronousSpeed>);
 

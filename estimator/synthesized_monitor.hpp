@@ -60,6 +60,12 @@ class SynthesizedMonitor {
     bool computed;       // which estimate fed the output
   };
 
+  struct Choice {
+    float factor_ratio;
+    float power_ratio;
+    bool computed;
+  };
+
   struct State {
     std::uint32_t hold_windows = 0;  // still to come on the computed estimate
   };
@@ -72,9 +78,18 @@ class SynthesizedMonitor {
   }
 
   [[nodiscard]] constexpr Output step(const Input& input) noexcept {
-    const float amount = magnitude(input.measured_power_w);
+    const Choice choice = choose(input.computed_power_w, input.measured_power_w);
+    const float torque_nm = choice.computed ? input.computed_torque_nm : input.measured_torque_nm;
+    return {.torque_nm = choice.factor_ratio * torque_nm,
+            .factor_ratio = choice.factor_ratio,
+            .power_ratio = choice.power_ratio,
+            .computed = choice.computed};
+  }
+  // The same for one who makes the torques afterwards: the powers alone decide.
+  [[nodiscard]] constexpr Choice choose(float computed_power_w, float measured_power_w) noexcept {
+    const float amount = magnitude(measured_power_w);
     const float below = amount > config_.power_floor_w ? amount : config_.power_floor_w;
-    const float ratio = (input.computed_power_w - input.measured_power_w) / below;  // (E40)
+    const float ratio = (computed_power_w - measured_power_w) / below;  // (E40)
     const bool excess = ratio > config_.threshold_ratio ||
                         (config_.mode == Mode::kAbsolute && ratio < -config_.threshold_ratio);
 
@@ -84,9 +99,7 @@ class SynthesizedMonitor {
     } else if (state_.hold_windows > 0) {
       --state_.hold_windows;
     }
-    const float factor = computed ? config_.compensation_ratio : 1.0F;
-    return {.torque_nm = factor * (computed ? input.computed_torque_nm : input.measured_torque_nm),
-            .factor_ratio = factor,
+    return {.factor_ratio = computed ? config_.compensation_ratio : 1.0F,
             .power_ratio = ratio,
             .computed = computed};
   }

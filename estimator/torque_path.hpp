@@ -150,7 +150,13 @@ class TorquePath {
   [[nodiscard]] bool add_run(std::span<const MotorSample> motor, std::span<const Row> rows,
                              bool speed_valid, bool meter_valid) noexcept;
   [[nodiscard]] std::uint32_t samples_left() const noexcept { return blocks_.power.samples_left(); }
-  [[nodiscard]] Output close_window(Feed feed) noexcept;
+  [[nodiscard]] Output close_window(Feed feed) noexcept {
+    Output output;
+    close_window(feed, output);
+    return output;
+  }
+  // Into what is kept: every field is written.
+  void close_window(Feed feed, Output& output) noexcept;
 
   // Samples are missing: the window begins anew, what was learned stays.
   void restart() noexcept;
@@ -168,32 +174,46 @@ class TorquePath {
     IdleTare tare;
     SynthesizedMonitor monitor;
   };
-  struct Window;    // means over the window, in the direction of rotation
-  struct Estimate;  // one torque with its share of the uncertainty
-  struct Load;      // what inertia and friction take
+  // Of Config, what a window reads, with products made once.
+  struct Settings {
+    Method method;
+    Speed speed;
+    std::uint32_t samples_per_window;
+    float count;  // of samples in a window
+    float pole_pairs;
+    float slip_ohm;            // 1.5 p^2, under R_r P_g in (E29)
+    float loss_sigma_ohm;      // 1.5 R_s and its relative uncertainty
+    float speed_variance_nm2;  // of inertia torque, from two noisy speeds
+    float rotor_resistance_ohm;
+    float rated_torque_nm;
+    float rated_slip_ratio;
+    float inertia_sigma_ratio;
+    float minimum_speed_rad_s;
+  };
+  // In torque_path_window.cpp, where a window is closed.
+  struct Window;  // means over the window, in the direction of rotation
+  struct Load;    // what inertia and friction take
+  struct Choice;  // which power, and its torque
 
   explicit constexpr TorquePath(const Config& config) noexcept;
 
   [[nodiscard]] Window window(const AirGapPower::Output& power,
                               const SynchronousSpeed::Output& synchronous) noexcept;
   void find_speeds(const SynchronousSpeed::Output& synchronous, Window& window) const noexcept;
-  void estimate_torque(const Window& window, Feed feed, Output& output) noexcept;
-  [[nodiscard]] Estimate computed(const Window& window) const noexcept;
-  [[nodiscard]] Estimate measured(const Window& window) const noexcept;
-  [[nodiscard]] Estimate choose(const Window& window, const Estimate& computed,
-                                const Estimate& measured, Origin& origin) noexcept;
   [[nodiscard]] Load follow_load(const Window& window, float airgap_torque_nm, Feed feed) noexcept;
-  void publish(const Window& window, const Load& load, const Estimate& chosen,
-               Output& output) noexcept;
+  [[nodiscard]] Choice choose(const Window& window, float leading_nm) noexcept;
   [[nodiscard]] float torque_variance(const Window& window, const Load& load,
-                                      const Estimate& estimate) const noexcept;
+                                      const Choice& chosen) const noexcept;
+  void publish_torque(const Window& window, const Load& load, const Choice& chosen,
+                      Output& output) noexcept;
 
   [[nodiscard]] bool add_motor(std::span<const MotorSample> motor) noexcept;
   void add_speed(float speed_rad_s) noexcept;
 
-  Config config_;
-  Blocks blocks_;
+  // In this order for the short reach of a Cortex-M7's floats, see firmware/control_loop.hpp.
+  Settings settings_;
   Sums sums_{};
+  Blocks blocks_;
 };
 
 // Trapezoid, as AirGapPower does.
@@ -225,14 +245,30 @@ constexpr auto TorquePath::make(const Config& config) noexcept
 }
 
 constexpr TorquePath::TorquePath(const Config& config) noexcept
-    : config_(config),
+    : settings_{.method = config.method,
+                .speed = config.speed,
+                .samples_per_window = config.power.samples_per_window,
+                .count = static_cast<float>(config.power.samples_per_window),
+                .pole_pairs = config.synchronous.pole_pairs,
+                .slip_ohm = 1.5F * config.synchronous.pole_pairs * config.synchronous.pole_pairs,
+                .loss_sigma_ohm = 1.5F * config.power.stator_resistance_ohm *
+                                  config.stator_resistance_sigma_ratio,
+                .speed_variance_nm2 = 0.0F,
+                .rotor_resistance_ohm = config.rotor_resistance_ohm,
+                .rated_torque_nm = config.rated_torque_nm,
+                .rated_slip_ratio = config.rated_slip_ratio,
+                .inertia_sigma_ratio = config.inertia_sigma_ratio,
+                .minimum_speed_rad_s = config.minimum_speed_rad_s},
       blocks_{.power = *AirGapPower::make(config.power),
               .synchronous = *SynchronousSpeed::make(config.synchronous),
               .meter = *MeasuredPower::make(config.meter),
               .drive = *DriveModel::make(config.drive),
               .friction = *LoadFriction::make(config.load_friction),
               .tare = *IdleTare::make(config.tare),
-              .monitor = *SynthesizedMonitor::make(config.monitor)} {}
+              .monitor = *SynthesizedMonitor::make(config.monitor)} {
+  const float speed_nm = blocks_.drive.gain(0.0F) * config.speed_sigma_rad_s;
+  settings_.speed_variance_nm2 = 2.0F * speed_nm * speed_nm;
+}
 
 static_assert(std::is_trivially_copyable_v<TorquePath>);
 static_assert(std::is_trivially_copyable_v<TorquePath::State>);

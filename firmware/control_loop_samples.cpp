@@ -145,8 +145,7 @@ void ControlLoop::estimate_alone(const estimator::MotorSample& motor,
 }
 
 void ControlLoop::close_path() noexcept {
-  own_.path =
-      path_.close_window(own_.feed == 1 ? estimator::Feed::kAir : estimator::Feed::kUnknown);
+  path_.close_window(own_.feed == 1 ? estimator::Feed::kAir : estimator::Feed::kUnknown, own_.path);
   own_.has_path = 1;
 }
 

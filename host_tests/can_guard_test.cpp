@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -51,6 +52,38 @@ TEST(CanGuard, HasTheCheckValueOfItsPolynomial) {
   constexpr std::array<std::uint8_t, 9> kDigits{'1', '2', '3', '4', '5', '6', '7', '8', '9'};
   EXPECT_EQ(crc16(kDigits), 0x29B1);
   EXPECT_EQ(crc16({}), 0xFFFF);
+}
+
+// Two bytes at a time by their quotient: the same as byte by byte, over counter, payload,
+// identifier.
+TEST(CanGuard, SealsWithTheCrcOfWhatItCovers) {
+  std::mt19937 random(11);
+  for (int run = 0; run < 1'000'000; ++run) {
+    Frame frame;
+    frame.id = random() & 0x7FFU;
+    frame.length = 8;
+    // Few bits set and few bits clear, too.
+    std::uint64_t data = std::uint64_t{random()} << 32U | random();
+    if (run % 3 == 1) data = std::uint64_t{1} << (random() % 64);
+    if (run % 3 == 2) data = ~(std::uint64_t{1} << (random() % 64));
+    put_word(frame.data, data);
+    const auto counter = static_cast<std::uint8_t>(random());
+    const auto payload = frame.data;
+    seal(frame, counter);
+    const std::array<std::uint8_t, 8> covered{counter,
+                                              payload[3],
+                                              payload[4],
+                                              payload[5],
+                                              payload[6],
+                                              payload[7],
+                                              static_cast<std::uint8_t>(frame.id),
+                                              static_cast<std::uint8_t>(frame.id >> 8U)};
+    const std::uint16_t crc = crc16(covered);
+    ASSERT_EQ(frame.data[0], crc & 0xFFU);
+    ASSERT_EQ(frame.data[1], crc >> 8U);
+    ASSERT_EQ(frame.data[2], counter);
+    ASSERT_TRUE(std::equal(payload.begin() + 3, payload.end(), frame.data.begin() + 3));
+  }
 }
 
 TEST(CanGuard, TakesTheThirdFrameInARowAndAllThatFollow) {

@@ -94,6 +94,41 @@ TEST(PathMap, SaysNothingWhereNothingIsKnown) {
   }
 }
 
+// Whatever the spindle is said to do, and at either end of what a cell can hold, where most cells
+// are passed over by their whole number alone.
+TEST(PathMap, NeverRaisesAndStaysANumberAtAnySpindleRatioAndOverride) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity();
+  for (const float ratio : {0.0F, -1.0F, 1e-30F, 0.5F, 2.0F, 1e30F, infinity, nan}) {
+    for (const float override_pct : {0.0F, 1.0F, 20.0F, 100.0F, 254.0F}) {
+      auto map = a_step();
+      for (int i = 0; i < 36; ++i) {
+        auto asked = question(override_pct);
+        asked.spindle_ratio = ratio;
+        const float allowed = map.limit(asked);
+        EXPECT_LE(allowed, override_pct) << ratio;
+        EXPECT_TRUE(std::isfinite(allowed)) << ratio;
+        map.learn(lesson(1.0F, 0.0F));
+      }
+    }
+  }
+}
+
+// A cell that asks for a hair less than the override binds, one that asks for as much does not.
+TEST(PathMap, HoldsACellToTheLastBitOfItsOverride) {
+  auto map = a_step();
+  const float there_pct = map.limit(question(200.0F));
+  EXPECT_NEAR(there_pct, override_of(400.0F), 0.15F);  // a cell holds 0.1 %
+  float above_pct = there_pct;
+  float below_pct = there_pct;
+  for (int k = 0; k < 200; ++k) {
+    EXPECT_EQ(map.limit(question(above_pct)), there_pct);
+    EXPECT_EQ(map.limit(question(below_pct)), below_pct);
+    above_pct = std::nextafter(above_pct, 254.0F);
+    below_pct = std::nextafter(below_pct, 0.0F);
+  }
+}
+
 // Any past, any question.
 TEST(PathMap, OnlyEverLowersAndContinuesBitExactlyWithoutAllocating) {
   std::mt19937 random(37);

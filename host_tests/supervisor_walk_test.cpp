@@ -109,6 +109,27 @@ TEST(SupervisorTable, AnswersEveryPairOfStateAndEvent) {
   EXPECT_EQ(next_of(S::kSafe, kResetEdge | kSafeClear), S::kReady);
 }
 
+// The search is left out where no trigger has come: never where the table has a row.
+TEST(SupervisorTable, OverlooksNoRowWhateverComesTogether) {
+  std::mt19937 random(5);
+  int taken = 0;
+  for (int run = 0; run < 2'000'000; ++run) {
+    const auto state = static_cast<S>(random() % kSupervisorStateCount);
+    EventSet events = static_cast<EventSet>(random());
+    for (int k = run % 8; k > 0; --k) events &= static_cast<EventSet>(random());
+    events &= (1U << kEventCount) - 1;
+    const Transition* expected = nullptr;
+    for (const Transition& row : kTransitions) {
+      const bool applies = (row.states & only(state)) != 0 && (row.events & ~events) == 0;
+      if (applies && expected == nullptr) expected = &row;
+    }
+    ASSERT_EQ(transition(state, events), expected) << static_cast<int>(state) << " " << events;
+    taken += expected != nullptr ? 1 : 0;
+  }
+  EXPECT_GT(taken, 500'000);
+  EXPECT_LT(taken, 1'500'000);
+}
+
 // How much the board may do: what leads up needs a person.
 constexpr int authority(S state) {
   switch (state) {

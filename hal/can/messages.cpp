@@ -37,9 +37,8 @@ static_assert(covered<Job>() == kWhole);
 static_assert(covered<Phases>() == kWhole);
 static_assert(covered<Spindle>() == kWhole >> 11U);
 
-// Flattened, every field is a shift and a mask of its own.
 template <class Message>
-[[gnu::flatten]] std::uint64_t word_of_fields(const Message& message) noexcept {
+std::uint64_t word_of_fields(const Message& message) noexcept {
   FieldWriter writer;
   Layout<Message>::visit(writer, message);
   return writer.word();
@@ -84,29 +83,34 @@ std::expected<Message, FrameError> unpack_fields(const Frame& frame) noexcept {
 
 }  // namespace
 
-Frame pack(const Estimate& message, std::uint8_t node) noexcept {
+// Flattened, every field is a shift and a mask of its own.
+[[gnu::flatten]] Frame pack(const Estimate& message, std::uint8_t node) noexcept {
   return pack_fields(message, node);
 }
-Frame pack(const Diagnostics& message, std::uint8_t node) noexcept {
+[[gnu::flatten]] Frame pack(const Diagnostics& message, std::uint8_t node) noexcept {
   return pack_fields(message, node);
 }
-Frame pack(const Emergency& message, std::uint8_t node) noexcept {
+[[gnu::flatten]] Frame pack(const Emergency& message, std::uint8_t node) noexcept {
   return pack_fields(message, node);
 }
-Frame pack(const Heartbeat& message, std::uint8_t node) noexcept {
+[[gnu::flatten]] Frame pack(const Heartbeat& message, std::uint8_t node) noexcept {
   return pack_fields(message, node);
 }
-Frame pack(const Phases& message, std::uint8_t node) noexcept { return pack_fields(message, node); }
-Frame pack(const Spindle& message, std::uint8_t node) noexcept {
+[[gnu::flatten]] Frame pack(const Phases& message, std::uint8_t node) noexcept {
   return pack_fields(message, node);
 }
-Frame pack(const Override& message, std::uint8_t node, std::uint8_t counter) noexcept {
+[[gnu::flatten]] Frame pack(const Spindle& message, std::uint8_t node) noexcept {
+  return pack_fields(message, node);
+}
+[[gnu::flatten]] Frame pack(const Override& message, std::uint8_t node,
+                            std::uint8_t counter) noexcept {
   return pack_guarded(message, node, counter);
 }
-Frame pack(const MachineState& message, std::uint8_t node, std::uint8_t counter) noexcept {
+[[gnu::flatten]] Frame pack(const MachineState& message, std::uint8_t node,
+                            std::uint8_t counter) noexcept {
   return pack_guarded(message, node, counter);
 }
-Frame pack(const Job& message, std::uint8_t node, std::uint8_t counter) noexcept {
+[[gnu::flatten]] Frame pack(const Job& message, std::uint8_t node, std::uint8_t counter) noexcept {
   return pack_guarded(message, node, counter);
 }
 

@@ -13,6 +13,7 @@
 #include "estimator/torque_path.hpp"
 #include "firmware/control_loop.hpp"
 #include "hal/can/messages.hpp"
+#include "hal/port.hpp"
 #include "host_tests/benchmarks/target_bodies.hpp"
 
 namespace cutforce::benchmarks {
@@ -21,13 +22,13 @@ class SynthesizedTick {
  public:
   SynthesizedTick(const firmware::ControlLoop::Config& config,
                   const control::Supervisor::Config& supervisor)
-      : gate_(*estimator::SampleGate::make(config.gate)),
-        front_end_(*estimator::FrontEnd::make(config.front_end)),
-        path_(estimator::TorquePath::make_checked(config.path)),
+      : diameter_m_(config.fixed_diameter_m),
         cutting_force_(*estimator::CuttingForce::make(config.force)),
-        controller_(control::ControlPath::make_checked(config.controller)),
         supervisor_(*control::Supervisor::make(supervisor)),
-        diameter_m_(config.fixed_diameter_m) {
+        controller_(control::ControlPath::make_checked(config.controller)),
+        path_(estimator::TorquePath::make_checked(config.path)),
+        gate_(*estimator::SampleGate::make(config.gate)),
+        front_end_(*estimator::FrontEnd::make(config.front_end)) {
     take_control();
   }
 
@@ -44,29 +45,36 @@ class SynthesizedTick {
                       .feed = estimator::Feed::kUnknown});
   }
 
-  void close_window() noexcept { torque_ = path_.close_window(estimator::Feed::kUnknown); }
+  void close_window() noexcept { path_.close_window(estimator::Feed::kUnknown, torque_); }
   void find_force() noexcept {
     force_ = cutting_force_.step({.cutting_torque_nm = torque_.cutting_torque_nm,
                                   .cutting_torque_sigma_nm = torque_.cutting_torque_sigma_nm,
                                   .speed_rad_s = torque_.speed_rad_s,
                                   .diameter_m = diameter_m_});
   }
+  // What the loop keeps of it: the command, the limits, what the law knows.
   void control() noexcept {
-    controlled_ =
+    const auto controlled =
         controller_.step({.force_n = force_.force_n,
                           .force_sigma_n = force_.force_sigma_n,
                           .force_age_ticks = 0,
                           .override_reported_pct = static_cast<float>(supervision_.override_pct),
-                          .spindle_ratio = 1.0F,
+                          .spindle_ratio = spindle_ratio_,
                           .force_valid = has_force(),
-                          .override_reported = true,
+                          .override_reported = override_reported_,
                           .permission = supervision_.permission,
-                          .part_start = false});
+                          .part_start = part_start_});
+    command_.override_pct = controlled.override_pct;
+    command_.override_code = controlled.override_code;
+    command_.controlling = controlled.controlling;
+    law_ = controlled.law;
+    saturated_low_ = controlled.saturated_low;
+    saturated_high_ = controlled.saturated_high;
   }
   void supervise() noexcept {
     health_.force_new = has_force();
     health_.force_n = force_.force_n;
-    health_.override_pct = controlled_.override_pct;
+    health_.override_pct = command_.override_pct;
     supervision_ = supervisor_.step(health_);
   }
   void pack() noexcept {
@@ -76,8 +84,8 @@ class SynthesizedTick {
                                           .reason = static_cast<std::uint8_t>(supervision_.reason),
                                           .force_n = force_.force_n,
                                           .enabled = supervision_.controlling,
-                                          .saturated_low = controlled_.saturated_low,
-                                          .saturated_high = controlled_.saturated_high,
+                                          .saturated_low = saturated_low_,
+                                          .saturated_high = saturated_high_,
                                           .in_cut = torque_.in_cut,
                                           .source = static_cast<std::uint8_t>(torque_.origin),
                                           .limit = false},
@@ -110,13 +118,6 @@ class SynthesizedTick {
     supervision_ = supervisor_.step(health_);
   }
 
-  estimator::SampleGate gate_;
-  estimator::FrontEnd front_end_;
-  estimator::TorquePath path_;
-  estimator::CuttingForce cutting_force_;
-  control::ControlPath controller_;
-  control::Supervisor supervisor_;
-  float diameter_m_;
   control::Supervisor::Input health_{.self_test_done = true,
                                      .self_test_passed = true,
                                      .checks_passed = true,
@@ -124,29 +125,42 @@ class SynthesizedTick {
                                      .output_failed = false,
                                      .foreign = false,
                                      .stop = false,
-                                     .missed_ticks = 0,
-                                     .machine_state_new = true,
                                      .bus_down = false,
+                                     .inhibit = false,
+                                     .threading = false,
+                                     .signals_refused = false,
+                                     .reversed = false,
                                      .arm = false,
                                      .control = false,
                                      .reset = false,
-                                     .inhibit = false,
-                                     .threading = false,
                                      .spindle_at_speed = true,
                                      .feeding = true,
+                                     .machine_state_new = true,
                                      .sample_new = true,
-                                     .signals_refused = false,
-                                     .reversed = false,
                                      .force_new = false,
+                                     .missed_ticks = 0,
                                      .force_n = 0.0F,
                                      .force_limit_n = 0.0F,
                                      .override_pct = 100};
   estimator::TorquePath::Output torque_{};
   estimator::CuttingForce::Output force_{};
-  control::ControlPath::Output controlled_{};
+  hal::Command command_{};
+  control::LawOutput law_{};
+  bool saturated_low_ = false;
+  bool saturated_high_ = false;
   control::Supervisor::Output supervision_{};
   hal::can::Frame frame_{};
   std::uint8_t counter_ = 0;
+  float spindle_ratio_ = 1.0F;
+  bool override_reported_ = true;
+  bool part_start_ = false;
+  float diameter_m_;
+  estimator::CuttingForce cutting_force_;
+  control::Supervisor supervisor_;
+  control::ControlPath controller_;
+  estimator::TorquePath path_;
+  estimator::SampleGate gate_;
+  estimator::FrontEnd front_end_;
 };
 
 }  // namespace cutforce::benchmarks

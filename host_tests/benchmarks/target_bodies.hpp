@@ -177,6 +177,22 @@ class SpaceVectorPower {
   float power_w_ = 0.0F;
 };
 
+// The same from three voltages and three currents as they are read: the core's transform takes
+// each channel's gain and offset with it, and has none without.
+class PhasePower {
+ public:
+  explicit PhasePower(const firmware::ControlLoop::Config& config)
+      : front_end_(*estimator::FrontEnd::make(config.front_end)) {}
+
+  void step(const std::array<float, 3>& voltage_v, const std::array<float, 3>& current_a) noexcept {
+    power_w_ = estimator::input_power(front_end_.step({voltage_v, current_a}).motor);
+  }
+
+ private:
+  estimator::FrontEnd front_end_;
+  float power_w_ = 0.0F;
+};
+
 // A frame that moves something, ready for the bus.
 class GuardedFrame {
  public:

@@ -260,21 +260,30 @@ void count_controllers(Meter& meter, const control::ControlPath::Config& config)
   count_predictive(meter, config.law.predictive);
 }
 
-void count_small(Meter& meter) {
+void count_small(Meter& meter, const ControlLoop::Config& config) {
   SpaceVectorPower power;
+  PhasePower phases(config);
+  std::array<float, 3> voltage_v{200.0F, -50.0F, -150.0F};
+  std::array<float, 3> current_a{4.0F, -1.0F, -3.0F};
   GuardedFrame frame;
   Counts powers;
+  Counts phase_powers;
   Counts frames;
   for (int k = 0; k < 1000; ++k) {
     estimator::MotorSample sample{.voltage_v = {.alpha = 200.0F, .beta = 100.0F},
                                   .current_a = {.alpha = 4.0F, .beta = 3.0F}};
     forget(sample);
     powers.add(meter.count([&] { power.step(sample); }));
+    forget(voltage_v);
+    forget(current_a);
+    phase_powers.add(meter.count([&] { phases.step(voltage_v, current_a); }));
     frames.add(meter.count([&] { frame.step(); }));
     keep(power);
+    keep(phases);
     keep(frame);
   }
   powers.show("space_vector_power");
+  phase_powers.show("phase_power");
   frames.show("guarded_frame");
 }
 
@@ -291,7 +300,7 @@ int count_all() {
   if (!config || !path_config) return 1;
   Meter meter;
   show_calibration(meter);
-  count_small(meter);
+  count_small(meter, *config);
   bool sound = count_samples(meter, stream, *config);
   sound = count_control_tick(meter, stream) && sound;
   for (const LoopNames& names : kLoops) sound = count_loop(meter, stream, names) && sound;
