@@ -25,6 +25,7 @@ namespace cutforce::control {
 struct LagStep {
   float length_s;
   float feed;          // e^(-d/tau_f)
+  float feed_lags;     // tau_f/d; 0 of no time at all
   float cut;           // e^(-d/tau_p)
   float sensed;        // e^(-d/tau_s)
   float sensed_force;  // of the force at the begin
@@ -38,6 +39,7 @@ struct LagStep {
     };
     LagStep step{.length_s = length_s,
                  .feed = decay(feed_lag_s),
+                 .feed_lags = length_s > 0.0F ? feed_lag_s / length_s : 0.0F,
                  .cut = decay(cut_lag_s),
                  .sensed = decay(sensor_lag_s),
                  .sensed_force = 0.0F,
@@ -52,11 +54,11 @@ struct LagStep {
 struct FeedState {
   float v = 0.0F;  // w-domain feed behind the servo
 
-  // One stretch of constant w; returns the mean of v over it. (C72)
-  [[nodiscard]] constexpr float advance(const LagStep& step, float feed_lag_s, float w) noexcept {
+  // One stretch of constant w; returns the mean of v over it, and w over no time at all. (C72)
+  [[nodiscard]] constexpr float advance(const LagStep& step, float w) noexcept {
     const float before = v;
     v = w + (v - w) * step.feed;
-    return step.length_s > 0.0F ? w - feed_lag_s * (v - before) / step.length_s : v;
+    return w - step.feed_lags * (v - before);
   }
 };
 

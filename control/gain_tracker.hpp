@@ -1,38 +1,33 @@
 // Force, estimate and process gain from the readings and the known feed: a Kalman filter while the
-// cut changes slowly, and a jump resolver when it does not. Equations (C76)-(C83).
+// cut changes slowly, and a jump resolver when it does not. Equations (C76)-(C79).
 //
 //   x = [F, s, K], F- = e_p F + (1 - e_p) K z, s- = e_s s + c_1 F + c_2 K z, K- = K
 //
 // z is the mean feed over the tick, in the w-domain (force_model.hpp). A reading too far from
-// s- means that K has jumped at a moment between two ticks ago and now. Six such moments and
-// "nothing happened" are then followed side by side for a few readings, each with the gain that
-// fits it best; force and gain are their mean, weighted by how well each fits, and the spread
-// of that mean is the uncertainty that the controller is told.
+// s- means that K has jumped at a moment between two ticks ago and now; jump_resolver.hpp follows
+// it for a few readings.
 //
 // In the air the gain is zero and the last one is remembered: entry is a jump whose size is about
 // the remembered gain.
+//
+// step() is defined in gain_tracker_tick.hpp, for who calls it.
 #pragma once
 
-#include <array>
-#include <cstddef>
+#include <algorithm>
+#include <bit>
+#include <cmath>
 #include <cstdint>
 #include <expected>
 #include <type_traits>
 
 #include "control/force_model.hpp"
+#include "control/jump_resolver.hpp"
 
 namespace cutforce::control {
-
-namespace detail {
-enum Covariance : std::size_t { kFF, kFs, kFK, kSS, kSK, kKK };
-}
 
 class GainTracker {
  public:
   enum class ConfigError : std::uint8_t { kPeriod, kLags, kGain, kNoise, kThreshold };
-
-  static constexpr std::size_t kMoments = 6;    // of a jump: 2 ticks of 3
-  static constexpr std::uint32_t kSamples = 5;  // readings that a jump is followed for
 
   struct Config {
     float period_s;
@@ -76,48 +71,22 @@ class GainTracker {
     bool rising;       // the jump is upwards
   };
 
-  struct Moment {
-    float force = 0.0F;  // response of F and s to a unit of gain since the jump
-    float sensed = 0.0F;
-    float fit = 0.0F;     // sum of h r / R
-    float weight = 0.0F;  // sum of h^2 / R
-  };
-
-  struct Point {  // of the past, to start again from
-    float force_n = 0.0F;
-    float sensed_n = 0.0F;
-    float gain_n = 0.0F;
-    float feed = 0.0F;  // of the tick after it
-    float feed_sigma = 0.0F;
-    float reading_n = 0.0F;  // at the end of that tick
-    float variance_n2 = 1.0F;
-  };
-
-  struct State {
-    float force_n = 0.0F;
-    float sensed_n = 0.0F;
-    float gain_n = 0.0F;
-    std::array<float, 6> covariance{};  // FF, Fs, FK, ss, sK, KK
-    float memory_n = 0.0F;              // last gain that was settled in a cut
+  struct Own {
+    ForceBelief now{};
+    float memory_n = 0.0F;  // last gain that was settled in a cut
     float correlation = 0.0F;
     float power = 1.0F;
     float last_innovation = 0.0F;
-    float noise_scale = 1.0F;  // variance of the readings over the configured one
-    Point past{};              // before the last reading
-    // The jump that is being followed.
-    Point base{};  // open loop since the jump may have begun
-    std::array<Moment, kMoments> moments{};
-    float residual = 0.0F;   // sum of r^2 / R if nothing happened
-    float misfit = 0.0F;     // the same of the moment that fits best
-    float timing_n2 = 0.0F;  // variance of the reading because the feed's moment is unknown
-    float prior_mean_n = 0.0F;
-    float prior_variance_n2 = 1.0F;
-    std::uint32_t samples = 0;   // 0: no jump
-    std::uint32_t restarts = 0;  // of this jump, because no moment fitted
+    float noise_scale = 1.0F;    // variance of the readings over the configured one
+    JumpResolver::Point past{};  // before the last reading
     std::uint32_t ticks = 0;     // 1: past holds the tick before
     std::uint32_t started = 0;
-    std::uint32_t rising = 0;
     std::uint32_t air = 1;
+  };
+
+  struct State {
+    Own own{};
+    JumpResolver::State jump{};
   };
 
   // Fails iff check() does.
@@ -135,38 +104,68 @@ class GainTracker {
   // Another part: only the last gain is remembered.
   [[gnu::cold]] void restart() noexcept;
 
-  [[nodiscard]] const State& state() const noexcept { return state_; }
-  void restore(const State& state) noexcept { state_ = state; }
+  [[nodiscard]] bool follows_jump() const noexcept { return jump_.active(); }
+  [[nodiscard]] float gain_n() const noexcept { return own_.now.gain_n; }
+  [[nodiscard]] State state() const noexcept { return {.own = own_, .jump = jump_.state()}; }
+  void restore(const State& state) noexcept {
+    own_ = state.own;
+    jump_.restore(state.jump);
+  }
 
  private:
-  static constexpr std::array<float, 3> kOnset{0.05F, 0.35F, 0.7F};  // parts of a tick
+  static constexpr float kTrendMemory_s = 0.25F;
+  static constexpr float kNoiseMemory_s = 20.0F;
+  static constexpr float kUsualPower =
+      0.9F;  // of a normal variable cut off at kUsual, less a margin
+  static constexpr float kTwiceThreshold_ratio = 0.81F;
+  static constexpr float kMostGain_ratio = 1000.0F;  // of the config's: no cut
+
+  static constexpr float kDrift_ratio_sqrt_s = 0.018F;  // of the gain, in a steady cut
+  static constexpr float kTrend_ratio_sqrt_s = 0.168F;  // more of it for each unit of trend
+  static constexpr float kTrendFloor = 0.1F;
+  static constexpr float kSettled_ratio = 0.1F;  // spread of a gain that is remembered
+  // The noise is matched to what is seen in a calm cut: a variance over the configured one.
+  static constexpr float kUsual = 3.0F;     // standard deviations; more is no noise
+  static constexpr float kQuietest = 1.0F;  // what the config says, at least
+  static constexpr float kLoudest = 10.0F;
+
+  static constexpr float square(float x) noexcept { return x * x; }
+  // std::clamp(x, 0, most), told by one comparison of whole numbers where there is nothing to do.
+  static constexpr float up_to(float x, float most) noexcept {
+    return std::bit_cast<std::uint32_t>(x) <= std::bit_cast<std::uint32_t>(most)
+               ? x
+               : std::clamp(x, 0.0F, most);
+  }
 
   explicit constexpr GainTracker(const Config& config) noexcept;
 
-  void predict(float feed, float feed_sigma, float drift) noexcept;
-  void correct(float innovation_n, float variance_n2) noexcept;
-  [[gnu::cold]] void begin_jump(const Input& input, float noise_n2) noexcept;
-  void follow(float feed, float feed_sigma, float reading_n, float noise_n2,
-              std::uint32_t tick) noexcept;
-  struct Fit {
-    float sharpness;  // 1 / variance of the gain
-    float jump_n;     // of the gain
-    float misfit;     // sum of r^2 / R, with the prior's share
-  };
-  using Fits = std::array<Fit, kMoments>;
-  [[nodiscard]] [[gnu::cold]] Fits fit_moments() noexcept;
-  [[gnu::cold]] void conclude(const Fits& fits) noexcept;
-  [[nodiscard]] [[gnu::cold]] bool follow_on(const Input& input, float noise_n2) noexcept;
+  void predict(ForceBelief& x, float feed, float feed_sigma, float drift) const noexcept;
+  static void correct(ForceBelief& x, float innovation_n, float variance_n2) noexcept;
+  [[nodiscard]] static bool sound(const ForceBelief& x) noexcept;
+  void make_sound() noexcept;
+  [[nodiscard]] float trend() const noexcept;
   [[nodiscard]] bool surprises(const Input& input, float innovation,
                                float innovation_n) const noexcept;
-  void note_calm(float innovation, float trend) noexcept;
-  [[gnu::cold]] void begin(const Input& input) noexcept;
+  void note_calm(float innovation, bool drifts) noexcept;
+  void remember(const JumpResolver::Reading& reading) noexcept;
+  [[gnu::cold]] void begin_jump(const JumpResolver::Reading& reading) noexcept;
+  [[nodiscard]] JumpResolver::Outcome follow_on(const JumpResolver::Reading& reading) noexcept;
+  [[gnu::cold]] void begin(float reading_n, float feed, float entry_n) noexcept;
   [[gnu::cold]] constexpr void settle_in_air() noexcept;
 
-  Config config_;
   LagStep lag_;
-  std::array<LagStep, 3> partial_;  // from a moment of a jump to the end of its tick
-  State state_{};
+  float left_;  // of the cut, (1 - e_p)
+  float noise_ratio_;
+  float noise_n2_;
+  float jump_threshold_;
+  float twice_threshold_;  // two readings in a row need no more
+  float most_gain_n_;
+  float sqrt_period_;
+  float memory_share_;  // of a tick in the trend
+  float noise_kept_;    // factor of the noise that a tick without any leaves,
+  float noise_share_;   // and what one of a standard deviation adds
+  Own own_{};
+  JumpResolver jump_;
 };
 
 constexpr auto GainTracker::make(const Config& config) noexcept
@@ -176,27 +175,37 @@ constexpr auto GainTracker::make(const Config& config) noexcept
 }
 
 constexpr GainTracker::GainTracker(const Config& config) noexcept
-    : config_(config),
-      lag_(LagStep::of(config.period_s, 0.0F, config.cut_lag_s, config.sensor_lag_s)) {
-  for (std::size_t k = 0; k < kOnset.size(); ++k) {
-    partial_[k] = LagStep::of((1.0F - kOnset[k]) * config.period_s, 0.0F, config.cut_lag_s,
-                              config.sensor_lag_s);
-  }
-  state_.memory_n = config.gain_n;
+    : lag_(LagStep::of(config.period_s, 0.0F, config.cut_lag_s, config.sensor_lag_s)),
+      left_(1.0F - lag_.cut),
+      noise_ratio_(config.noise_ratio),
+      noise_n2_(square(config.noise_n)),
+      jump_threshold_(config.jump_threshold),
+      twice_threshold_(kTwiceThreshold_ratio * config.jump_threshold),
+      most_gain_n_(kMostGain_ratio * config.gain_n),
+      sqrt_period_(std::sqrt(config.period_s)),
+      memory_share_(config.period_s / (kTrendMemory_s + config.period_s)),
+      noise_kept_(kNoiseMemory_s / (kNoiseMemory_s + config.period_s)),
+      noise_share_(config.period_s / (kNoiseMemory_s + config.period_s) / kUsualPower),
+      jump_({.period_s = config.period_s,
+             .cut_lag_s = config.cut_lag_s,
+             .sensor_lag_s = config.sensor_lag_s,
+             .most_gain_n = most_gain_n_}) {
+  own_.memory_n = config.gain_n;
   settle_in_air();
 }
 
 // Out of the cut: the last gain is remembered.
 constexpr void GainTracker::settle_in_air() noexcept {
-  State& s = state_;
+  Own& s = own_;
   s.air = 1;
-  s.gain_n = 0.0F;
-  s.covariance = {};
-  s.covariance[detail::kSS] = config_.noise_n * config_.noise_n;
+  s.now.gain_n = 0.0F;
+  s.now.covariance = {};
+  s.now.covariance[ForceBelief::kSS] = noise_n2_;
   s.correlation = 0.0F;
   s.power = 1.0F;
 }
 
 static_assert(std::is_trivially_copyable_v<GainTracker>);
+static_assert(std::is_standard_layout_v<GainTracker::State>);
 
 }  // namespace cutforce::control

@@ -6,7 +6,6 @@ namespace cutforce::control {
 namespace {
 
 constexpr float kMoves_ratio = 0.04F;  // a chain that changes by less within a tick tells nothing
-constexpr float kMemory_s = 0.6F;      // of moving time
 constexpr float kEnough_s = 0.4F;      // of moving time, before anything is decided
 constexpr float kBetter_ratio = 0.45F;
 constexpr float kStep_s = 0.06F;  // the present dead time follows by this much at a time
@@ -23,20 +22,22 @@ float LatencyBank::candidate_s(std::size_t k) const noexcept {
   return config_.most_latency_s * static_cast<float>(k - 1) / static_cast<float>(kCandidates - 2);
 }
 
-// One tick of a chain of unit gain; returns its relative change. (C100)
-float LatencyBank::advance(Chain& chain, float latency_s,
-                           std::span<const float> sent) const noexcept {
-  const float ticks = latency_s / config_.period_s;
-  const auto whole = static_cast<std::size_t>(ticks);
-  const float part = ticks - static_cast<float>(whole);
+// One tick of a chain of unit gain, whose dead time is so many ticks; returns its relative change.
+// (C100)
+inline float LatencyBank::advance(Chain& chain, float ticks,
+                                  std::span<const float> sent) const noexcept {
+  const auto whole = static_cast<std::uint32_t>(ticks);
   if (whole + 1 >= sent.size()) return 0.0F;
+  const float part = ticks - static_cast<float>(whole);
   const float w = part * sent[whole + 1] + (1.0F - part) * sent[whole];
-  const float mean = chain.feed = w + (chain.feed - w) * tick_.feed;
+  const float mean = w + (chain.feed - w) * tick_.feed;
   const float before = chain.sensed;
-  chain.sensed =
-      tick_.sensed * chain.sensed + tick_.sensed_force * chain.force + tick_.sensed_input * mean;
+  const float now =
+      tick_.sensed * before + tick_.sensed_force * chain.force + tick_.sensed_input * mean;
   chain.force = tick_.cut * chain.force + (1.0F - tick_.cut) * mean;
-  return chain.sensed + before > kLeast_n ? relative_change(chain.sensed, before) : 0.0F;
+  chain.feed = mean;
+  chain.sensed = now;
+  return now + before > kLeast_n ? relative_change(now, before) : 0.0F;
 }
 
 // The present dead time goes towards a clearly better one. (C102)
@@ -52,29 +53,32 @@ void LatencyBank::judge(std::size_t best) noexcept {
 
 auto LatencyBank::step(const Input& input) noexcept -> Output {
   State& s = state_;
-  std::array<float, kCandidates> change{};
-  bool moves = false;
-  for (std::size_t k = 0; k < kCandidates; ++k) {
-    change[k] = advance(s.chains[k], candidate_s(k), input.sent);
-    moves = moves || change[k] > kMoves_ratio || change[k] < -kMoves_ratio;
+  std::array<float, kCandidates> change;
+  change[0] = advance(s.chains[0], s.latency_s / config_.period_s, input.sent);
+  float most = estimator::magnitude(change[0]);
+  for (std::size_t k = 1; k < kCandidates; ++k) {
+    change[k] = advance(s.chains[k], grid_ticks_ * static_cast<float>(k - 1), input.sent);
+    most = std::max(most, estimator::magnitude(change[k]));
   }
-  const bool told = input.usable && s.reading_n > 0.0F && moves;
+  const bool told = input.usable && s.reading_n > 0.0F && most > kMoves_ratio;
   const float seen = told ? relative_change(input.reading_n, s.reading_n) : 0.0F;
   s.reading_n = input.usable ? std::max(input.reading_n, kLeast_n) : 0.0F;
-  std::size_t best = 0;
   if (told) {
     s.evidence = std::min(s.evidence + config_.period_s, 100.0F);
-    const float share = config_.period_s / (kMemory_s + config_.period_s);
     for (std::size_t k = 0; k < kCandidates; ++k) {  // (C101)
-      Chain& chain = s.chains[k];
-      chain.misfit += share * ((seen - change[k]) * (seen - change[k]) - chain.misfit);
+      const float off = seen - change[k];
+      s.chains[k].misfit += share_ * (off * off - s.chains[k].misfit);
     }
   }
-  for (std::size_t k = 1; k < kCandidates; ++k) {
-    if (s.chains[k].misfit < s.chains[best].misfit) best = k;
-  }
   const float present = s.chains[0].misfit;
-  const float ratio = present > 0.0F ? s.chains[best].misfit / present : 1.0F;
+  float least = present;
+  std::size_t best = 0;
+  for (std::size_t k = 1; k < kCandidates; ++k) {
+    if (!(s.chains[k].misfit < least)) continue;
+    least = s.chains[k].misfit;
+    best = k;
+  }
+  const float ratio = present > 0.0F ? least / present : 1.0F;
   if (told) judge(best);
   return {.latency_s = s.latency_s, .misfit_ratio = ratio};  // (C103)
 }

@@ -83,14 +83,18 @@ class LatencyBank {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
+  static constexpr float kMemory_s = 0.6F;  // of moving time
+
   explicit constexpr LatencyBank(const Config& config) noexcept;
   [[nodiscard]] float candidate_s(std::size_t k) const noexcept;
-  [[nodiscard]] float advance(Chain& chain, float latency_s,
+  [[nodiscard]] float advance(Chain& chain, float ticks,
                               std::span<const float> sent) const noexcept;
   void judge(std::size_t best) noexcept;
 
   Config config_;
   LagStep tick_;
+  float grid_ticks_;  // from one candidate to the next
+  float share_;       // of a tick in the misfits
   State state_{};
 };
 
@@ -102,8 +106,9 @@ constexpr auto LatencyBank::make(const Config& config) noexcept
 
 constexpr LatencyBank::LatencyBank(const Config& config) noexcept
     : config_(config),
-      tick_(
-          LagStep::of(config.period_s, config.feed_lag_s, config.cut_lag_s, config.sensor_lag_s)) {
+      tick_(LagStep::of(config.period_s, config.feed_lag_s, config.cut_lag_s, config.sensor_lag_s)),
+      grid_ticks_(config.most_latency_s / static_cast<float>(kCandidates - 2) / config.period_s),
+      share_(config.period_s / (kMemory_s + config.period_s)) {
   state_.latency_s = config.latency_s;
 }
 

@@ -2,12 +2,10 @@
 
 #include <algorithm>
 
-#include "estimator/polynomials.hpp"
+#include "control/feed_power.hpp"
 
 namespace cutforce::control {
 namespace {
-
-using estimator::power_positive;
 
 constexpr float kScale = 1024.0F;     // of e
 constexpr float kMargin_s = 0.04F;    // path: a part lies this much off, perhaps
@@ -38,7 +36,7 @@ constexpr std::size_t index_of(float position_s) noexcept {
 // e of a gain; 0 where nothing limits. (C93)
 float PathMap::feed_at_reference(float gain_n) const noexcept {
   if (!(gain_n > 0.02F * config_.gain_n)) return 0.0F;
-  return power_positive(gain_n / config_.gain_n, -inverse_exponent_);
+  return feed_power(gain_n / config_.gain_n, -inverse_exponent_);
 }
 
 // In whole numbers, which say the same as fractions would. What is heavier than known is believed
@@ -94,12 +92,6 @@ void PathMap::believe(std::uint32_t cell, std::uint32_t count) noexcept {
   merge(cell, flat ? sum : own, flat ? count : 1);
 }
 
-void PathMap::pass(float feed_ratio) noexcept {  // (C92)
-  State& s = state_;
-  s.earlier_s = {s.position_s, s.earlier_s[0]};
-  s.position_s += feed_ratio * config_.period_s;
-}
-
 void PathMap::learn(const Lesson& lesson) noexcept {
   State& s = state_;
   pass(lesson.feed_ratio);
@@ -145,14 +137,22 @@ float PathMap::slowest(const Question& question, float scale_pct) const noexcept
   const float reach_s =
       0.01F * question.override_pct * (config_.period_s + brake_s) + kMargin_s + kCell_s;
   const std::size_t last = index_of(begin_s + reach_s);
+  // Most cells ask for no less, which their whole number tells: nothing known is the highest.
+  const auto enough = [scale_pct](float pct) {
+    return static_cast<std::uint32_t>(std::min(65534.0F, std::max(0.0F, pct / scale_pct + 1.0F)));
+  };
   float lowest_pct = question.override_pct;
+  std::uint32_t highest = enough(lowest_pct);
   for (std::size_t cell = index_of(begin_s - kBehind_s); cell <= last; ++cell) {
-    const std::uint16_t known = s.learned[cell];
-    if (known == 0 || known == kFree) continue;
+    const std::uint32_t known = s.learned[cell];
+    if (known - 1U >= highest) continue;
     const float there_pct = scale_pct * static_cast<float>(known);
     const float way_s = static_cast<float>(cell) * kCell_s - begin_s - kMargin_s;
     const float here_pct = (100.0F * way_s + brake_s * there_pct) * per_brake_1_s;
-    lowest_pct = std::min(lowest_pct, std::max(there_pct, here_pct));
+    const float allowed_pct = std::max(there_pct, here_pct);
+    if (allowed_pct >= lowest_pct) continue;
+    lowest_pct = allowed_pct;
+    highest = enough(lowest_pct);
   }
   return lowest_pct;
 }
@@ -162,7 +162,7 @@ float PathMap::limit(const Question& question) noexcept {
   if (!limits()) return question.override_pct;
   if (question.reference_n != reference_n_) {
     reference_n_ = question.reference_n;
-    reference_feed_ = power_positive(reference_n_ / config_.gain_n, inverse_exponent_);
+    reference_feed_ = feed_power(reference_n_ / config_.gain_n, inverse_exponent_);
   }
   const float scale_pct =
       100.0F / kScale * question.spindle_ratio * reference_feed_ * s.wear_feed_ratio;  // (C94)

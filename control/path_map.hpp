@@ -21,7 +21,7 @@
 #include <expected>
 #include <type_traits>
 
-#include "estimator/polynomials.hpp"
+#include "control/feed_power.hpp"
 
 namespace cutforce::control {
 
@@ -72,11 +72,6 @@ class PathMap {
   };
 
   struct State {
-    // Of earlier parts, and of this one up to two cells behind the last that was written; 0:
-    // nothing known.
-    std::array<std::uint16_t, kCells> learned{};
-    std::array<std::uint16_t, 5> recorded{};  // the last cells of this part, the latest last
-    std::uint16_t reserved = 0;
     float position_s = 0.0F;           // of the tool, at 100 %
     std::array<float, 2> earlier_s{};  // one and two ticks ago
     float wear_feed_ratio = 1.0F;      // override that holds the reference now, over that of then
@@ -88,6 +83,11 @@ class PathMap {
     std::uint32_t written = 0;         // cells of this part
     std::uint32_t started = 0;         // 1: a part has begun
     std::uint32_t trusted = 1;
+    std::array<std::uint16_t, 5> recorded{};  // the last cells of this part, the latest last
+    std::uint16_t reserved = 0;
+    // Of earlier parts, and of this one up to two cells behind the last that was written; 0:
+    // nothing known. The last of all, where a Cortex-M7 does not have to reach over it.
+    std::array<std::uint16_t, kCells> learned{};
   };
 
   // Fails iff check() does.
@@ -109,11 +109,17 @@ class PathMap {
     state_.started = 0;
   }
   // Once a tick, before limit(): a tick without anything to learn, or one with.
-  void pass(float feed_ratio) noexcept;
+  void pass(float feed_ratio) noexcept {  // (C92)
+    State& s = state_;
+    s.earlier_s = {s.position_s, s.earlier_s[0]};
+    s.position_s += feed_ratio * config_.period_s;
+  }
   void learn(const Lesson& lesson) noexcept;
   // The override that the map allows; the wanted one where it has nothing against it.
   [[nodiscard]] float limit(const Question& question) noexcept;
 
+  // Whether learn() does more than pass().
+  [[nodiscard]] bool records() const noexcept { return state_.started != 0; }
   // Whether limit() may have something against an override.
   [[nodiscard]] bool limits() const noexcept { return state_.started != 0 && state_.trusted != 0; }
 
@@ -148,9 +154,9 @@ class PathMap {
 constexpr PathMap::PathMap(const Config& config) noexcept
     : config_(config),
       inverse_exponent_(1.0F / config.feed_exponent),
-      wear_far_ratio_(estimator::power_positive(kFar_ratio, inverse_exponent_)),
-      wear_least_ratio_(estimator::power_positive(kWearMost, -inverse_exponent_)),
-      wear_most_ratio_(estimator::power_positive(kWearLeast, -inverse_exponent_)) {
+      wear_far_ratio_(feed_power(kFar_ratio, inverse_exponent_)),
+      wear_least_ratio_(feed_power(kWearMost, -inverse_exponent_)),
+      wear_most_ratio_(feed_power(kWearLeast, -inverse_exponent_)) {
   state_.last_cell = kFree;
 }
 

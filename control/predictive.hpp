@@ -109,22 +109,26 @@ class Predictive {
   // nothing of this part, whose path nobody followed.
   [[gnu::cold]] void rejoin() noexcept;
 
+  // Whether a jump of the process gain is being followed: the dearest ticks.
+  [[nodiscard]] bool follows_jump() const noexcept { return tracker_.follows_jump(); }
+
   [[nodiscard]] State state() const noexcept;
   void restore(const State& state) noexcept;
 
  private:
   explicit constexpr Predictive(const Config& config) noexcept;
 
-  struct Forecast {
-    float force_n;  // at the end of the dead time
-    float feed;     // v there
-    float path_s;   // until then, in seconds at 100 %
-    float drive_n;  // feared gain at the present spindle speed: force for a unit of feed
+  struct Forecast {  // of the end of the dead time
+    float force_n;
+    float feed;    // v
+    float path_s;  // until then, in seconds at 100 %; 0 where nobody asks
   };
   struct Horizon {  // of the force, (C88)
-    float length_s;
-    float force;  // e_H
-    float feed;   // g_H
+    float force;    // e_H
+    float feed;     // g_H
+    float command;  // 1 - e_H - g_H
+    // How many times the gain that the law works with the true one may be. (C104)
+    float stable_gain_ratio;
   };
   enum Reach : std::size_t { kOneTick, kTwoTicks, kMiddle, kCalm, kReaches };
 
@@ -132,41 +136,51 @@ class Predictive {
     float mean;  // over the tick that ends
     float sigma;
   };
-  [[nodiscard]] KnownFeed known_feed(float applied_pct) noexcept;
-  [[nodiscard]] Forecast forecast(float force_n, float drive_n) noexcept;
-  [[nodiscard]] float pessimistic_gain_n(const GainTracker::Output& seen) noexcept;
-  [[nodiscard]] Reach reach(const Forecast& ahead, float reference_n) const noexcept;
-  [[nodiscard]] float stable_gain_ratio(const Horizon& horizon) const noexcept;
-  [[nodiscard]] Reach with_margin(Reach reach, const GainTracker::Output& seen) const noexcept;
-  [[nodiscard]] float wanted_pct(const Forecast& ahead, const Horizon& horizon,
-                                 float reference_n) const noexcept;
-  void doubt_timing(const GainTracker::Output& seen) noexcept;
   [[gnu::cold]] constexpr void assume_latency(float latency_s) noexcept;
+  [[gnu::cold]] void begin_part() noexcept;
+  [[nodiscard]] Output hold(const KnownFeed& feed, float speed, float applied_pct) noexcept;
+  [[nodiscard]] KnownFeed known_feed(float applied_pct) noexcept;
+  void note_jump(bool rising, float gain_before_n) noexcept;
   void find_latency(const Input& input, bool jumped) noexcept;
-  [[nodiscard]] float feed_ratio(float w) noexcept;
-  [[nodiscard]] const float* sent() const noexcept { return &own_.sent[own_.newest]; }
-  void fear(const GainTracker::Output& seen, float gain_n, bool rise, CutPhase phase) noexcept;
+  void learn(const GainTracker::Output& seen, float feed, bool settled) noexcept;
   [[nodiscard]] float within_map(float wanted_pct, const Forecast& ahead,
                                  const Input& input) noexcept;
-  void learn(const GainTracker::Output& seen, float feed, CutPhase phase) noexcept;
-  [[nodiscard]] float as_code(float wanted_pct, float sent_pct) const noexcept;
-  [[nodiscard]] bool may_rise(const GainTracker::Output& seen, CutPhase phase) noexcept;
+  [[nodiscard]] float feed_ratio(float w) noexcept;
+  [[nodiscard]] const float* sent() const noexcept { return &own_.sent[own_.newest]; }
 
+  // predictive_plan.hpp
+  [[nodiscard]] float pessimistic_gain_n(const GainTracker::Output& seen,
+                                         float spread_ratio) noexcept;
+  [[nodiscard]] bool may_rise(const GainTracker::Output& seen, CutPhase phase) noexcept;
+  void fear(const GainTracker::Output& seen, float gain_n, bool rise, CutPhase phase) noexcept;
+  [[nodiscard]] Forecast forecast(float force_n, float drive_n) noexcept;
+  [[nodiscard]] const Horizon& horizon(const GainTracker::Output& seen, float force_n,
+                                       float reference_n, bool settled) const noexcept;
+  [[nodiscard]] float wanted_pct(const Forecast& ahead, const Horizon& horizon, float drive_n,
+                                 float reference_n, bool settled) const noexcept;
+  [[nodiscard]] float as_code(float wanted_pct, float sent_pct) const noexcept;
+
+  // In the order of what is asked for most: a Cortex-M7 reaches a float within 1 kB of a pointer.
   Config config_;
-  GainTracker tracker_;
-  PathMap map_;
-  LatencyBank bank_;
-  std::uint32_t whole_ticks_;    // of the dead time
-  float dead_decay_;             // of the cut over the dead time
-  LagStep tick_, early_, late_;  // early_: the part of a tick before a byte arrives
+  std::uint32_t whole_ticks_;       // of the dead time
+  LagStep tick_, early_, late_;     // early_: the part of a tick before a byte arrives
+  float early_share_, late_share_;  // of the tick
+  float latency_sigma_ratio_;       // of the tick
   std::array<Horizon, kReaches> horizons_;
+  float ahead_s_;                   // that the trend of the gain is feared for
   float inverse_exponent_;          // 1/p
+  float step_pct_;                  // of the override
   float forgets_ratio_;             // what is left of a feared gain after a tick,
   float forgets_after_jump_ratio_;  // and soon after a jump
+  float doubt_share_;               // of a tick in the doubt of the timing,
+  float trend_share_;               // and in the trend of the gain
   // The last answer of feed_ratio(): at a resting override w comes to rest too.
   float asked_w_ = 1.0F;
   float answered_ratio_ = 1.0F;
   Own own_{};
+  GainTracker tracker_;
+  LatencyBank bank_;
+  PathMap map_;
 };
 
 }  // namespace cutforce::control

@@ -15,6 +15,8 @@ inline constexpr float kAfterJump_1_s = 4.835F;  // faster recovery while a jump
 inline constexpr float kMiddle_s = 0.2F;
 inline constexpr float kLongestLatency_s = 0.4F;
 inline constexpr float kMostTicks = static_cast<float>(Predictive::kHistory - 2);
+inline constexpr float kDoubtMemory_s = 20.0F;
+inline constexpr float kTrendMemory_s = 0.25F;
 
 [[nodiscard]] constexpr LagStep lag_step(const Predictive::Config& config,
                                          float length_s) noexcept {
@@ -51,39 +53,6 @@ inline constexpr float kMostTicks = static_cast<float>(Predictive::kHistory - 2)
 
 }  // namespace detail
 
-constexpr Predictive::Predictive(const Config& config) noexcept
-    : config_(config),
-      tracker_(GainTracker::make_checked(detail::tracker_config(config))),
-      map_(PathMap::make_checked(detail::map_config(config))),
-      bank_(LatencyBank::make_checked(detail::bank_config(config))),
-      tick_(detail::lag_step(config, config.period_s)),
-      inverse_exponent_(1.0F / config.feed_exponent),
-      forgets_ratio_(estimator::exp_bounded(-config.recovery_1_s * config.period_s)),
-      forgets_after_jump_ratio_(estimator::exp_bounded(-detail::kAfterJump_1_s * config.period_s)) {
-  assume_latency(config.latency_s);
-  const std::array<float, kReaches> lengths{config.period_s, 2.0F * config.period_s,
-                                            std::max(detail::kMiddle_s, 2.0F * config.period_s),
-                                            config.calm_horizon_s};
-  for (std::size_t k = 0; k < kReaches; ++k) {
-    const LagStep h = detail::lag_step(config, lengths[k]);
-    const float apart_s = config.feed_lag_s - config.process_lag_s;
-    horizons_[k] = {.length_s = lengths[k],
-                    .force = h.cut,
-                    .feed = (h.feed - h.cut) * config.feed_lag_s / apart_s};
-  }
-  own_.sent.fill(1.0F);
-  own_.feed.v = 1.0F;
-}
-
-constexpr void Predictive::assume_latency(float latency_s) noexcept {  // (C71)
-  whole_ticks_ = static_cast<std::uint32_t>(latency_s / config_.period_s + 1e-4F);
-  const float early_s =
-      std::max(latency_s - static_cast<float>(whole_ticks_) * config_.period_s, 0.0F);
-  dead_decay_ = estimator::exp_bounded(-latency_s / config_.process_lag_s);
-  early_ = detail::lag_step(config_, early_s);
-  late_ = detail::lag_step(config_, config_.period_s - early_s);
-}
-
 constexpr std::expected<void, Predictive::ConfigError> Predictive::Config::check() const noexcept {
   const auto fail = [](ConfigError error) { return std::unexpected{error}; };
   if (!(period_s > 0.0F && period_s <= 10.0F)) return fail(ConfigError::kPeriod);
@@ -107,6 +76,52 @@ constexpr std::expected<void, Predictive::ConfigError> Predictive::Config::check
       (step_pct != 1 && step_pct != 10))
     return fail(ConfigError::kRange);
   return {};
+}
+
+constexpr Predictive::Predictive(const Config& config) noexcept
+    : config_(config),
+      tick_(detail::lag_step(config, config.period_s)),
+      latency_sigma_ratio_(config.latency_sigma_s / config.period_s),
+      inverse_exponent_(1.0F / config.feed_exponent),
+      step_pct_(static_cast<float>(config.step_pct)),
+      forgets_ratio_(estimator::exp_bounded(-config.recovery_1_s * config.period_s)),
+      forgets_after_jump_ratio_(estimator::exp_bounded(-detail::kAfterJump_1_s * config.period_s)),
+      doubt_share_(config.period_s / detail::kDoubtMemory_s),
+      trend_share_(config.period_s / (detail::kTrendMemory_s + config.period_s)),
+      tracker_(GainTracker::make_checked(detail::tracker_config(config))),
+      bank_(LatencyBank::make_checked(detail::bank_config(config))),
+      map_(PathMap::make_checked(detail::map_config(config))) {
+  const std::array<float, kReaches> lengths{config.period_s, 2.0F * config.period_s,
+                                            std::max(detail::kMiddle_s, 2.0F * config.period_s),
+                                            config.calm_horizon_s};
+  for (std::size_t k = 0; k < kReaches; ++k) {
+    const LagStep h = detail::lag_step(config, lengths[k]);
+    const float apart_s = config.feed_lag_s - config.process_lag_s;
+    const float feed = (h.feed - h.cut) * config.feed_lag_s / apart_s;
+    horizons_[k] = {
+        .force = h.cut, .feed = feed, .command = 1.0F - h.cut - feed, .stable_gain_ratio = 1.0F};
+  }
+  assume_latency(config.latency_s);
+  own_.sent.fill(1.0F);
+  own_.feed.v = 1.0F;
+}
+
+constexpr void Predictive::assume_latency(float latency_s) noexcept {  // (C71)
+  whole_ticks_ = static_cast<std::uint32_t>(latency_s / config_.period_s + 1e-4F);
+  const float early_s =
+      std::max(latency_s - static_cast<float>(whole_ticks_) * config_.period_s, 0.0F);
+  early_ = detail::lag_step(config_, early_s);
+  late_ = detail::lag_step(config_, config_.period_s - early_s);
+  early_share_ = early_.length_s / config_.period_s;
+  late_share_ = late_.length_s / config_.period_s;
+  ahead_s_ = latency_s + config_.period_s + 0.5F * config_.process_lag_s;
+  const float dead_decay = estimator::exp_bounded(-latency_s / config_.process_lag_s);
+  const float decay = tick_.cut;
+  for (Horizon& horizon : horizons_) {  // (C104)
+    const float loop = horizon.force / (1.0F - horizon.force) * (1.0F - decay);
+    horizon.stable_gain_ratio =
+        1.0F + (1.0F - estimator::magnitude(decay - loop)) / (loop * dead_decay);
+  }
 }
 
 }  // namespace cutforce::control

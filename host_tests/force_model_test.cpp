@@ -62,7 +62,7 @@ TEST(ForceModel, IsTheIntegralOfTheThreeLags) {
     FeedState feed{.v = static_cast<float>(exact.v)};
     Lags moving = exact;
     moving.run(length_s, w, 1.0);
-    const float mean = feed.advance(step, static_cast<float>(exact.feed_s), static_cast<float>(w));
+    const float mean = feed.advance(step, static_cast<float>(w));
     EXPECT_NEAR(feed.v, moving.v, 1e-5) << i;
     EXPECT_NEAR(mean, moving.path / length_s, 2e-5) << i;
 
@@ -91,7 +91,7 @@ TEST(ForceModel, IsCloseToTheLagsWhileTheFeedMoves) {
   double worst = 0.0;
   for (int k = 0; k < 20; ++k) {
     exact.run(0.05, 1.0, 1.0);
-    const float mean = feed.advance(step, 0.03F, 1.0F);
+    const float mean = feed.advance(step, 1.0F);
     sensed = step.sensed * sensed + step.sensed_force * force + step.sensed_input * mean;
     force = step.cut * force + (1.0F - step.cut) * mean;
     worst = std::max({worst, std::abs(static_cast<double>(force) - exact.force),
@@ -109,7 +109,7 @@ TEST(ForceModel, TakesALagOfZeroForNone) {
   EXPECT_EQ(step.sensed, 0.0F);
   EXPECT_FLOAT_EQ(step.sensed_force, step.cut);  // the estimate is the force
   FeedState feed;
-  EXPECT_EQ(feed.advance(step, 0.0F, 0.7F), 0.7F);
+  EXPECT_EQ(feed.advance(step, 0.7F), 0.7F);
   EXPECT_EQ(feed.v, 0.7F);
 }
 
@@ -129,9 +129,9 @@ TEST(ForceModel, IsOneStepOrManyAndStaysBetweenItsInputsWithoutAllocating) {
     const float w = 2.0F * part();
     FeedState at_once = before;
     FeedState in_parts = before;
-    const float mean = at_once.advance(whole, feed_lag_s, w);
-    const float mean_1 = in_parts.advance(first, feed_lag_s, w);
-    const float mean_2 = in_parts.advance(second, feed_lag_s, w);
+    const float mean = at_once.advance(whole, w);
+    const float mean_1 = in_parts.advance(first, w);
+    const float mean_2 = in_parts.advance(second, w);
     ASSERT_NEAR(at_once.v, in_parts.v, 1e-5F);
     ASSERT_NEAR(mean, (length_s * mean_1 + (0.05F - length_s) * mean_2) / 0.05F, 1e-4F);
     ASSERT_GE(mean, std::min(before.v, w) - 1e-4F);

@@ -1,4 +1,4 @@
-#include "control/gain_tracker.hpp"
+#include "control/gain_tracker_tick.hpp"
 
 #include <gtest/gtest.h>
 
@@ -209,7 +209,7 @@ TEST(GainTracker, RemembersTheGainThroughTheAirAndMeetsItAgain) {
   auto air = Bench::input(0.0, 2.0);
   air.air = true;
   for (int i = 0; i < 40; ++i) EXPECT_EQ(bench.tracker.step(air).gain_n, 0.0F);
-  EXPECT_NEAR(bench.tracker.state().memory_n, 400.0F, 20.0F);
+  EXPECT_NEAR(bench.tracker.state().own.memory_n, 400.0F, 20.0F);
   bench.cut = {};
   const double entry_n = bench.jump(2.0, 400.0, 0.0).gain_n;  // one reading
   EXPECT_TRUE(bench.seen.jumped && bench.seen.rising);
@@ -225,14 +225,15 @@ TEST(GainTracker, LearnsNothingWhileItCoasts) {
   const auto before = bench.tracker.state();
   for (int i = 0; i < 20; ++i) bench.tracker.coast(1.0F);
   const auto after = bench.tracker.state();
-  EXPECT_EQ(after.gain_n, before.gain_n);
-  EXPECT_EQ(after.memory_n, before.memory_n);
-  EXPECT_EQ(after.correlation, before.correlation);
-  EXPECT_EQ(after.samples, 0U);
-  EXPECT_GT(after.covariance[5], before.covariance[5]);  // it grows less sure
+  EXPECT_EQ(after.own.now.gain_n, before.own.now.gain_n);
+  EXPECT_EQ(after.own.memory_n, before.own.memory_n);
+  EXPECT_EQ(after.own.correlation, before.own.correlation);
+  EXPECT_EQ(after.jump.samples, 0U);
+  EXPECT_GT(after.own.now.covariance[5], before.own.now.covariance[5]);  // it grows less sure
   // Coasting through a step of the feed, the force it expects follows the feed.
   for (int i = 0; i < 40; ++i) bench.tracker.coast(0.5F);
-  EXPECT_NEAR(bench.tracker.state().force_n, 0.5F * after.gain_n, 0.01F * after.gain_n);
+  EXPECT_NEAR(bench.tracker.state().own.now.force_n, 0.5F * after.own.now.gain_n,
+              0.01F * after.own.now.gain_n);
   for (int i = 0; i < 40; ++i) bench.cut.tick(0.5, 400.0, 400.0, 0.0);
   EXPECT_FALSE(bench.tick(0.5).jumped);
 }

@@ -91,7 +91,7 @@ float misfit_with(std::size_t ticks, float believed_s, float gain_n, bool usable
   for (int i = 0; i < 60; ++i) {
     for (std::size_t k = sent.size() - 1; k > 0; --k) sent[k] = sent[k - 1];
     sent[0] = i / 10 % 2 == 0 ? 0.5F : 1.5F;
-    const float mean = feed.advance(lag, 0.03F, sent[ticks]);
+    const float mean = feed.advance(lag, sent[ticks]);
     sensed = lag.sensed * sensed + lag.sensed_force * force + lag.sensed_input * mean;
     force = lag.cut * force + (1.0F - lag.cut) * mean;
     out = bank.step({.sent = sent, .reading_n = gain_n * sensed, .usable = usable});

@@ -92,10 +92,13 @@ class FusedSamples {
 // has calm stretches, jumps up and down, entry, and air.
 class CutScript {
  public:
-  [[nodiscard]] float force_n(std::uint32_t tick, float override_pct) noexcept {
+  [[nodiscard]] static float gain_n_pct(std::uint32_t tick) noexcept {
     constexpr std::array<float, 10> kGain_n_pct{0.0F, 4.0F, 4.0F, 7.0F, 3.0F,
                                                 8.0F, 8.0F, 2.0F, 5.0F, 0.0F};
-    const float gain = kGain_n_pct[tick / 60 % kGain_n_pct.size()];
+    return kGain_n_pct[tick / 60 % kGain_n_pct.size()];
+  }
+  [[nodiscard]] float force_n(std::uint32_t tick, float override_pct) noexcept {
+    const float gain = gain_n_pct(tick);
     random_ = random_ * 1664525U + 1013904223U;
     const float noise = static_cast<float>(random_ >> 8) * (1.0F / 16777216.0F) - 0.5F;
     return gain * override_pct * (1.0F + 0.04F * noise);
@@ -152,6 +155,7 @@ class LawTick {
               .part_start = false};
   }
   void step() noexcept { override_pct_ = law_.step(input_).override_pct; }
+  [[nodiscard]] const Law& law() const noexcept { return law_; }
 
  private:
   Law law_;

@@ -225,7 +225,9 @@ void count_script(Meter& meter, Body& body, std::string_view name) {
   counts.show(name);
 }
 
-// Calm: the second half of each stretch of the script, where no gain has changed for a while.
+// Calm: a tick in a cut that neither begins nor follows nor ends a jump of the gain. The law says
+// so itself: noise makes it follow one where the script has none, and a jump is followed for as
+// long as the law sees fit.
 void count_predictive(Meter& meter, const control::Predictive::Config& config) {
   static constinit Place<PredictiveTick> place{};
   auto& law = place.make(config);
@@ -233,9 +235,11 @@ void count_predictive(Meter& meter, const control::Predictive::Config& config) {
   Counts all;
   for (std::uint32_t tick = 0; tick < kScriptTicks; ++tick) {
     law.prepare(tick);
+    const bool followed = law.law().follows_jump();
     const std::uint32_t count = meter.count([&] { law.step(); });
     all.add(count);
-    if (tick % 60 >= 40 && tick / 60 % 10 != 0 && tick / 60 % 10 != 9) calm.add(count);
+    const bool in_cut = CutScript::gain_n_pct(tick) > 0.0F;
+    if (in_cut && !followed && !law.law().follows_jump()) calm.add(count);
   }
   calm.show("predictive_calm");
   all.show("predictive");
