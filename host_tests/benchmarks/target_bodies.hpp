@@ -57,7 +57,7 @@ class FusedSample {
   explicit FusedSample(const firmware::ControlLoop::Config& config)
       : gate_(*estimator::SampleGate::make(config.gate)),
         front_end_(*estimator::FrontEnd::make(config.front_end)),
-        observer_(*estimator::FusedObserver::make(config.fused)) {}
+        observer_(*estimator::FusedObserver::make(calibrated(config.fused))) {}
 
   void step(const hal::Sample& sample) noexcept {
     const auto checked = gate_.step(gated(sample));
@@ -74,6 +74,13 @@ class FusedSample {
   void tick() noexcept { keep(observer_.tick(estimator::AirCut::Feed::kUnknown)); }
 
  private:
+  // Nobody calibrates the channels here, and an observer that waits for it never gets to a cut.
+  [[nodiscard]] static estimator::FusedObserver::Config calibrated(
+      estimator::FusedObserver::Config config) noexcept {
+    config.calibrate = false;
+    return config;
+  }
+
   estimator::SampleGate gate_;
   estimator::FrontEnd front_end_;
   estimator::FusedObserver observer_;
