@@ -20,7 +20,11 @@ constexpr float kLargestFall_ratio = 0.5F;
 
 }  // namespace
 
-StatorResistance::StatorResistance(const Config& config) noexcept : config_(config) {
+StatorResistance::StatorResistance(const Config& config) noexcept
+    : least_copper_(kStandsOut_sigmas * config.iron_torque_sigma_nm /
+                    (config.rated_frequency_rad_s * config.resistance_sigma_ratio *
+                     config.stator_resistance_ohm)),
+      config_(config) {
   const float a = config.rotor_resistance_ohm / (1.5F * config.pole_pairs);
   const float sa = config.rotor_sigma_ratio * a;
   const float sr = a * config.resistance_sigma_ratio * config.stator_resistance_ohm;
@@ -38,20 +42,14 @@ auto StatorResistance::make(const Config& config) noexcept
 
 void StatorResistance::step(const Input& in) noexcept {
   auto& s = state_.sums;
-  // The copper term of the idle must stand out of what the iron loss may be.
-  const float speed_ratio = magnitude(in.frequency_rad_s) / config_.rated_frequency_rad_s;
-  const float copper = config_.resistance_sigma_ratio * config_.stator_resistance_ohm *
-                       magnitude(in.idle_copper_nm_ohm);
-  if (!(copper > kStandsOut_sigmas * config_.iron_torque_sigma_nm * speed_ratio)) {
-    s.fill(0.0F);
-    state_.blocks = 0;
+  if (!stands_out(in.idle_copper_nm_ohm, in.frequency_rad_s)) {
+    pause();
     return;
   }
   const float moved = in.torque_nm - state_.first_torque_nm;
   const float limit = kSteady_ratio * config_.rated_torque_nm;
   if (!in.steady || moved > limit || moved < -limit) {
-    s.fill(0.0F);
-    state_.blocks = 0;
+    forget();
     state_.first_torque_nm = in.torque_nm;
     if (!in.steady) return;
   }

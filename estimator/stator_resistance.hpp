@@ -18,6 +18,8 @@
 #include <expected>
 #include <type_traits>
 
+#include "estimator/polynomials.hpp"
+
 namespace cutforce::estimator {
 
 class StatorResistance {
@@ -71,6 +73,15 @@ class StatorResistance {
   [[nodiscard]] static std::expected<StatorResistance, ConfigError> make(
       const Config& config) noexcept;
   void step(const Input& input) noexcept;
+  // Whether the copper term of the idle stands out of what the iron loss may be; else step() is
+  // pause().
+  [[nodiscard]] bool stands_out(float idle_copper_nm_ohm, float frequency_rad_s) const noexcept {
+    return magnitude(idle_copper_nm_ohm) > least_copper_ * magnitude(frequency_rad_s);
+  }
+  [[gnu::always_inline]] void pause() noexcept {
+    if (state_.sums[5] != 0.0F || state_.blocks != 0) [[unlikely]]
+      forget();
+  }
 
   // Found anew with each block only, asked for several times a tick.
   [[nodiscard]] float change_ohm() const noexcept { return change_ohm_; }  // within -50 and +100 %
@@ -84,13 +95,18 @@ class StatorResistance {
 
  private:
   explicit StatorResistance(const Config& config) noexcept;
+  void forget() noexcept {
+    state_.sums.fill(0.0F);
+    state_.blocks = 0;
+  }
   void learn() noexcept;
   void find_change() noexcept;
 
-  Config config_;
   float change_ohm_ = 0.0F;  // dR
   float change_sigma_ohm_ = 0.0F;
+  float least_copper_;  // over the frequency
   State state_{};
+  Config config_;
 };
 
 static_assert(std::is_trivially_copyable_v<StatorResistance>);
