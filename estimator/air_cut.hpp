@@ -16,6 +16,8 @@
 #include <expected>
 #include <type_traits>
 
+#include "estimator/polynomials.hpp"
+
 namespace cutforce::estimator {
 
 class AirCut {
@@ -61,7 +63,7 @@ class AirCut {
     bool steady;          // speed steady for the waiting time
     float net_torque_nm;  // (y - b) sgn(w)
     float tare_nm;        // b, in the direction of rotation
-    float tare_sigma_nm;
+    float tare_variance_nm2;
     float idle_variance_nm2;
     float idle_s;      // time in this idle, 0 outside
     float tare_age_s;  // time since the tare was last adjusted
@@ -88,7 +90,7 @@ class AirCut {
 
   [[nodiscard]] static constexpr std::expected<AirCut, ConfigError> make(
       const Config& config) noexcept;
-  [[nodiscard]] Output step(const Input& input) noexcept;
+  [[nodiscard, gnu::always_inline]] Output step(const Input& input) noexcept;
 
   // The torque scale or offset changed by a calibration: average the tare anew.
   void restart_average() noexcept {
@@ -100,18 +102,133 @@ class AirCut {
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  explicit constexpr AirCut(const Config& config) noexcept : config_(config) {}
-  void tare(float y_nm, float variance_nm2, float duration_s) noexcept;
-  [[nodiscard]] Phase decide(const Input& input, float y_nm, float slope_nm,
-                             float sign) const noexcept;
+  static constexpr float kUnsteady_ratio = 0.03F;  // of the rated torque, as acceleration torque
+  static constexpr float kLargestThreshold_ratio = 0.06F;
+  static constexpr float kAging_ratio_sqrt_s = 5e-4F;  // friction drifts between tare and cut
+  static constexpr float kUnknownFriction_ratio = 0.05F;
+  static constexpr float kBand_ratio = 0.1F;
+  static constexpr float kSlopeTime_s = 0.05F;
+  static constexpr float kTareTime_s = 0.3F;
+  static constexpr float kShortestWait_s = 0.06F;
+  static constexpr float kEven_s = 0.02F;
 
-  Config config_;
+  // What every tick compares with, of the configuration.
+  struct Levels {
+    float coulomb_nm;
+    float viscous_nm_s_rad;
+    float steady_rad_s;  // the twice smoothed speed lags by less while the speed is steady
+    float band_nm;       // a cut that is this near to air may be its end
+    float contact_nm;    // least threshold of (E92)
+    float threshold_nm;  // largest
+    float aging_nm2_s;
+    float unknown_nm2;
+  };
+
+  explicit constexpr AirCut(const Config& config) noexcept;
+  void tare(float y_nm, float variance_nm2, float duration_s) noexcept;
+  void change(Phase now, float y_nm, Feed feed) noexcept;
+  [[nodiscard]] Phase decide(const Input& input, float y_nm, float lag_rad_s,
+                             float sign) const noexcept;
+  [[nodiscard, gnu::always_inline]] Phase decide_quickly(const Input& input, float y_nm,
+                                                         float lag_rad_s,
+                                                         float sign) const noexcept;
+  void follow_phase(const Input& input, float y_nm, float lag_rad_s, float sign,
+                    bool steady) noexcept;
+  void lose(float speed_rad_s) noexcept;
+
   State state_{};
+  Levels levels_;
+  Config config_;
 };
 
 constexpr auto AirCut::make(const Config& config) noexcept -> std::expected<AirCut, ConfigError> {
   if (const auto checked = config.check(); !checked) return std::unexpected{checked.error()};
   return AirCut{config};
+}
+
+constexpr AirCut::AirCut(const Config& config) noexcept : config_(config) {
+  const float rated = config.rated_torque_nm;
+  const float contact = config.contact_ratio * rated;
+  const float limit = kLargestThreshold_ratio * rated;
+  const float aging = kAging_ratio_sqrt_s * rated;
+  const float unknown = kUnknownFriction_ratio * rated;
+  levels_ = {.coulomb_nm = config.coulomb_torque_nm,
+             .viscous_nm_s_rad = config.viscous_nm_s_rad,
+             .steady_rad_s = kUnsteady_ratio * rated * kSlopeTime_s / config.inertia_kg_m2,
+             .band_nm = kBand_ratio * rated,
+             .contact_nm = contact,
+             .threshold_nm = contact > limit ? contact : limit,
+             .aging_nm2_s = aging * aging,
+             .unknown_nm2 = unknown * unknown};
+}
+
+// Nearly always the phase stays what it is, far from any threshold: that needs no root, and gives
+// what decide() would.
+inline auto AirCut::decide_quickly(const Input& input, float y_nm, float lag_rad_s,
+                                   float sign) const noexcept -> Phase {
+  if (input.feed == Feed::kUnknown && input.calibrated) [[likely]] {
+    if (state_.phase == Phase::kCut) {
+      if (state_.steady_s <= kShortestWait_s) return Phase::kCut;
+      if (state_.has_tare != 0 && magnitude(state_.slow_net_nm) > levels_.threshold_nm)
+        return Phase::kCut;
+    } else if (state_.phase == Phase::kIdle) {
+      if (magnitude(y_nm - state_.tare_nm) <= levels_.contact_nm) return Phase::kIdle;
+    }
+  }
+  return decide(Input{input}, y_nm, lag_rad_s, sign);
+}
+
+[[gnu::always_inline]] inline void AirCut::follow_phase(const Input& input, float y_nm,
+                                                        float lag_rad_s, float sign,
+                                                        bool steady) noexcept {
+  const float h = input.duration_s;
+  const bool in_band =
+      state_.phase != Phase::kCut || magnitude(y_nm - state_.tare_nm) < levels_.band_nm;
+  state_.even_s = steady ? state_.even_s + h : 0.0F;
+  state_.steady_s = steady && in_band ? state_.steady_s + h : 0.0F;
+  const Phase now = decide_quickly(input, y_nm, lag_rad_s, sign);
+  if (now != state_.phase) [[unlikely]]
+    change(now, y_nm, input.feed);
+  if (now != Phase::kIdle) return;
+  if (state_.has_tare == 0) state_.tare_nm = y_nm;
+  if (steady) tare(y_nm, input.sigma_nm * input.sigma_nm, h);
+}
+
+inline auto AirCut::step(const Input& input) noexcept -> Output {
+  const float h = input.duration_s;
+  const float w = input.speed_rad_s;
+  if (!input.valid) [[unlikely]]
+    lose(w);
+  const float sign = w > 0.0F ? 1.0F : (w < 0.0F ? -1.0F : 0.0F);
+  const float y =
+      (input.load_torque_nm - levels_.viscous_nm_s_rad * w) * sign - levels_.coulomb_nm;  // (E90)
+  const float share = h < kSlopeTime_s ? h * (1.0F / kSlopeTime_s) : 1.0F;
+  const float lag = w - state_.slow_speed_rad_s;
+  state_.slow_speed_rad_s += share * lag;
+  // Smoothed twice: channel offsets ripple at the electrical frequency until calibrated.
+  const float slow_lag = state_.slow_speed_rad_s - state_.slower_speed_rad_s;
+  state_.slower_speed_rad_s += share * slow_lag;
+  state_.slow_net_nm += share * (y - state_.tare_nm - state_.slow_net_nm);
+  if (input.valid) [[likely]]
+    follow_phase(input, y, lag, sign, magnitude(slow_lag) < levels_.steady_rad_s);
+  state_.tare_age_s += h;
+
+  float tare_variance_nm2 = levels_.unknown_nm2;
+  if (state_.has_tare != 0) {
+    tare_variance_nm2 = state_.variance_nm2;
+    if (state_.idle_s > h)
+      tare_variance_nm2 *= h / (state_.idle_s < kTareTime_s ? state_.idle_s : kTareTime_s);
+    tare_variance_nm2 += levels_.aging_nm2_s * state_.tare_age_s;
+  }
+  return {.phase = state_.phase,
+          .steady = state_.even_s > kEven_s,
+          .net_torque_nm = (y - state_.tare_nm) * sign,
+          .tare_nm = state_.tare_nm,
+          .tare_variance_nm2 = tare_variance_nm2,
+          .idle_variance_nm2 = state_.variance_nm2,
+          .idle_s = state_.phase == Phase::kIdle ? state_.idle_s : 0.0F,
+          .tare_age_s = state_.tare_age_s,
+          .has_tare = state_.has_tare != 0};
 }
 
 static_assert(std::is_trivially_copyable_v<AirCut>);

@@ -65,29 +65,6 @@ void FluxTorque::seed() noexcept {
   state_.flux_v_s = {state_.emf_v.beta / w, -state_.emf_v.alpha / w};  // e / (j w_e)
 }
 
-auto FluxTorque::take() noexcept -> Window {
-  Window window{.torque_nm = state_.torque_nm,
-                .moment_nm = 0.0F,
-                .power_w = 0.0F,
-                .current_squared_a2 = dot(state_.current_a, state_.current_a),
-                .duration_s = state_.elapsed_periods * config_.sample_period_s,
-                .flux_v_s = state_.flux_v_s,
-                .current_a = state_.current_a};
-  if (state_.elapsed_periods > 0.0F) {
-    const float per_period = 1.0F / state_.elapsed_periods;
-    window.torque_nm = 0.5F * state_.torque_sum_nm * per_period;
-    window.moment_nm = 0.5F * state_.moment_sum_nm * per_period * per_period;
-    window.power_w = 1.5F * state_.power_sum_w * per_period;
-    window.current_squared_a2 = state_.current_sum_a2 * per_period;
-  }
-  state_.torque_sum_nm = 0.0F;
-  state_.moment_sum_nm = 0.0F;
-  state_.power_sum_w = 0.0F;
-  state_.current_sum_a2 = 0.0F;
-  state_.elapsed_periods = 0.0F;
-  return window;
-}
-
 void FluxTorque::remove_offset(SpaceVector voltage_v, SpaceVector current_a) noexcept {
   const SpaceVector e =
       emf({.voltage_v = voltage_v, .current_a = current_a}, config_.stator_resistance_ohm);

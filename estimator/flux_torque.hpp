@@ -83,7 +83,7 @@ class FluxTorque {
   [[gnu::cold]] void step(const MotorSample& sample, float elapsed_periods) noexcept;
 
   // Closes the window. Duration 0 (no sample since the last call) gives the last torque.
-  [[nodiscard]] Window take() noexcept;
+  [[nodiscard, gnu::always_inline]] Window take() noexcept;
 
   // Electrical frequency for the samples to come, (E63), (E64).
   constexpr void set_frequency(float frequency_rad_s) noexcept;
@@ -199,6 +199,30 @@ constexpr void FluxTorque::set_frequency(float frequency_rad_s) noexcept {
   state_.leak = leak;
   state_.gain_s = gain;
   state_.frequency_rad_s = frequency_rad_s;
+}
+
+inline auto FluxTorque::take() noexcept -> Window {
+  const float periods = state_.elapsed_periods;
+  Window window{.torque_nm = state_.torque_nm,
+                .moment_nm = 0.0F,
+                .power_w = 0.0F,
+                .current_squared_a2 = 0.0F,
+                .duration_s = periods * config_.sample_period_s,
+                .flux_v_s = state_.flux_v_s,
+                .current_a = state_.current_a};
+  if (periods > 0.0F) [[likely]] {
+    const float per_period = 1.0F / periods;
+    window.torque_nm = 0.5F * state_.torque_sum_nm * per_period;
+    window.moment_nm = 0.5F * state_.moment_sum_nm * per_period * per_period;
+    window.power_w = 1.5F * state_.power_sum_w * per_period;
+    window.current_squared_a2 = state_.current_sum_a2 * per_period;
+  } else {
+    window.current_squared_a2 = dot(state_.current_a, state_.current_a);
+  }
+  state_.torque_sum_nm = state_.moment_sum_nm = 0.0F;
+  state_.power_sum_w = state_.current_sum_a2 = 0.0F;
+  state_.elapsed_periods = 0.0F;
+  return window;
 }
 
 static_assert(std::is_trivially_copyable_v<FluxTorque>);

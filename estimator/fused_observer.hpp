@@ -4,6 +4,7 @@
 //   frequency  psi_R = psi - L_sigma i;  w_psi = arg(psi_R conj psi_R,prev)/h, w_i likewise (E100)
 //              w_e += s (w_x - w_e) + a_e h,  a_e += s^2/4 (w_x - w_e)/h,  s = 1 - exp(-h/15 ms)
 //              w_x = w_psi once calibrated and agreeing, else w_i (E101)
+//   slow work  in turns: the filter's covariances in one tick of four, the power meter of eight
 //   speed      measured less its ripple, or without a sensor
 //              (w_psi - w_sl)/p, w_sl = 2 R_R T_m / (3 p |psi_R|^2) (E102)
 //   noise      NoiseMeter (E103);  ripple  SpeedRipple (E105)
@@ -125,8 +126,8 @@ class FusedObserver {
     float idle_power_torque_nm = 0.0F;  // P_i p / w_e likewise
     std::uint32_t ticks = 0;            // since the estimate became valid
     std::uint32_t calibrated = 0;
-    std::array<float, 2 * (kLongestDelay + 1)> delayed_nm{};  // torque and its moment, a ring
   };
+  using Delayed = std::array<float, 2 * (kLongestDelay + 1)>;  // torque and its moment, a ring
 
   struct State {
     FluxTorque::State flux;
@@ -138,6 +139,7 @@ class FusedObserver {
     StatorResistance::State resistance;
     PowerScale::State meter;
     Tick tick;
+    Delayed delayed_nm;
   };
 
   [[nodiscard]] static constexpr std::expected<FusedObserver, ConfigError> make(
@@ -182,12 +184,39 @@ class FusedObserver {
   void restore(const State& state) noexcept;
 
  private:
+  static constexpr float kLeastFlux_ratio = 0.3F;
+  static constexpr float kModel_ratio = 5e-4F;
+  static constexpr float kUsualResistance_ratio =
+      0.1F;  // what temperature does to copper, one sigma
+
   explicit constexpr FusedObserver(const Config& config) noexcept;
 
+  // What is left to read of the configuration once the parts are made.
+  struct Settings {
+    float sample_period_s;
+    float pole_pairs;
+    float leakage_inductance_h;
+    float least_flux_squared;  // that is believed
+    float copper_loss_ohm;     // 1.5 R_s
+    float slip_ohm;            // 2 R_R/(3 p)
+    float rated_torque_nm;
+    float model_variance_nm2;
+    float usual_ohm;  // what temperature does to the resistance
+    std::uint32_t speed_delay_ticks;
+    std::uint32_t sensorless;
+    std::uint32_t tracks_resistance;
+  };
+  // Of the tick's length, found anew where it changes: ticks are nearly always of one length.
+  struct Length {
+    float tick_s;
+    float ticks_per_s;
+    float keep;               // 1 - s of (E101)
+    float acceleration_1_s2;  // s^2/4/h
+  };
   struct Rotation {
-    float flux_rad_s;
-    float current_rad_s;
+    float seen_rad;  // that the vector which is believed turned by
     float flux_squared;
+    float flux_rad_s;
   };
   struct Speed {
     float mean_rad_s;
@@ -195,30 +224,53 @@ class FusedObserver {
     float samples;
     bool valid;
   };
+  // Torque of a tick and what it was corrected by.
+  struct Torque {
+    float copper;    // x of (E110)
+    float by_power;  // P_i p / w_e
+    float mean_nm;
+    float moment_nm;
+  };
+  void renew_length(float tick_s) noexcept;
   [[nodiscard]] Rotation rotation(const FluxTorque::Window& window) noexcept;
-  void track_frequency(const Rotation& rotation, float duration_s) noexcept;
-  [[nodiscard]] Speed take_speed(const Rotation& rotation, float torque_nm, bool locked,
-                                 float duration_s) noexcept;
-  [[nodiscard]] std::array<float, 2> delayed(float torque_nm, float moment_nm) noexcept;
-  [[nodiscard]] float correction_nm(const FluxTorque::Window& window, float copper) const noexcept;
-  void learn(const FluxTorque::Window& window, const Rotation& rotation, const Output& out,
-             float copper, float speed_rad_s) noexcept;
+  [[nodiscard]] bool flux_agrees(float flux_squared, float flux_rad, float expected_rad,
+                                 SpaceVector current_a) const noexcept;
+  void track_frequency(const Rotation& rotation, SpaceVector current_before_a) noexcept;
+  [[nodiscard]] bool locks(SpaceVector current_before_a) noexcept;
+  [[nodiscard]] Speed take_speed(const Rotation& rotation, float torque_nm) noexcept;
+  [[nodiscard]] Torque corrected(const FluxTorque::Window& window) const noexcept;
+  [[nodiscard]] LoadTorqueFilter::Output filter(const Torque& torque, const Speed& speed,
+                                                const LoadTorqueFilter::Noise& noise) noexcept;
+  [[nodiscard]] LoadTorqueFilter::Noise noise(const Speed& speed, bool by_angle) const noexcept;
+  void delay(Torque& torque) noexcept;
+  void learn_ripple(const AirCut::Output& air, float speed_rad_s) noexcept;
+  void note_even(bool steady, float turned_rad) noexcept;
+  void learn(const FluxTorque::Window& window, const Rotation& rotation, const Torque& torque,
+             const AirCut::Output& air, float speed_rad_s) noexcept;
+  void learn_resistance(const FluxTorque::Window& window, float flux_rad_s,
+                        float speed_rad_s) noexcept;
   [[nodiscard]] float sigma_nm(const LoadTorqueFilter::Output& load, const AirCut::Output& air,
-                               float torque_nm, float copper, float change_nm) noexcept;
-  [[nodiscard]] Output unlocked(float speed_rad_s, AirCut::Feed feed, Output out) noexcept;
+                               const Torque& torque, float change_nm) noexcept;
+  [[nodiscard]] Output unlocked(const FluxTorque::Window& window, float speed_rad_s,
+                                AirCut::Feed feed) noexcept;
+  [[nodiscard]] float airgap_power_w(const FluxTorque::Window& window) const noexcept {
+    return window.power_w - settings_.copper_loss_ohm * window.current_squared_a2;
+  }
 
-  FluxTorque flux_;  // these two first: every sample needs them
+  // In this order because a Cortex-M7 reaches floats no further than 1020 bytes from a base: what
+  // every sample needs first, what a tick seldom needs last.
+  FluxTorque flux_;
   Tick tick_{};
-  Config config_;
+  Settings settings_;
+  Length length_{};
   LoadTorqueFilter filter_;
   AirCut air_;
+  RunUpInertia inertia_;
+  PowerScale meter_;
   NoiseMeter noise_;
   SpeedRipple ripple_{};
-  RunUpInertia inertia_;
   StatorResistance resistance_;
-  PowerScale meter_;
-  float share_of_s_ = 0.0F;  // length of the tick that share_, of (E101), belongs to
-  float share_ = 0.0F;
+  Delayed delayed_nm_{};
 };
 
 constexpr auto FusedObserver::make(const Config& config) noexcept
@@ -229,15 +281,29 @@ constexpr auto FusedObserver::make(const Config& config) noexcept
 
 constexpr FusedObserver::FusedObserver(const Config& config) noexcept
     : flux_(*FluxTorque::make(config.flux)),
-      config_(config),
       filter_(*LoadTorqueFilter::make(config.filter)),
       air_(*AirCut::make(config.air)),
+      inertia_(*RunUpInertia::make(config.inertia)),
+      meter_(*PowerScale::make(config.meter)),
       noise_({.sample_period_s = config.flux.sample_period_s,
               .rated_torque_nm = config.filter.rated_torque_nm,
               .sensorless = config.sensorless}),
-      inertia_(*RunUpInertia::make(config.inertia)),
-      resistance_(*StatorResistance::make(config.resistance)),
-      meter_(*PowerScale::make(config.meter)) {
+      resistance_(*StatorResistance::make(config.resistance)) {
+  const float least_flux = kLeastFlux_ratio * config.rated_flux_v_s;
+  const float model = kModel_ratio * config.filter.rated_torque_nm;
+  settings_ = {
+      .sample_period_s = config.flux.sample_period_s,
+      .pole_pairs = config.flux.pole_pairs,
+      .leakage_inductance_h = config.leakage_inductance_h,
+      .least_flux_squared = least_flux * least_flux,
+      .copper_loss_ohm = 1.5F * config.flux.stator_resistance_ohm,
+      .slip_ohm = 2.0F * config.resistance.rotor_resistance_ohm / (3.0F * config.flux.pole_pairs),
+      .rated_torque_nm = config.filter.rated_torque_nm,
+      .model_variance_nm2 = model * model,
+      .usual_ohm = kUsualResistance_ratio * config.flux.stator_resistance_ohm,
+      .speed_delay_ticks = config.speed_delay_ticks,
+      .sensorless = config.sensorless ? 1U : 0U,
+      .tracks_resistance = config.track_resistance && !config.sensorless ? 1U : 0U};
   tick_.calibrated = config.calibrate ? 0U : 1U;
 }
 

@@ -7,115 +7,44 @@
 namespace cutforce::estimator {
 namespace {
 
-constexpr float kStayQuiet_ratio = 0.999F;
-constexpr float kStayEdge_ratio = 0.97F;
-constexpr float kSmallestProbability = 1e-4F;
-constexpr float kLargestLogRatio = 40.0F;
+constexpr float kUnsettled_ratio = 0.1F;  // of 1/S, from one step of a recursion to the next
 
-struct Innovation {
-  float value;
-  float variance;
-};
+using Model = LoadTorqueFilter::Model;
 
-// What both models share in a tick.
-struct Shared {
-  float g;
-  float c;           // k g
-  float into_speed;  // what the torque's noise adds to the variances: g^2 R_T,
-  float into_both;   // k g^2 R_T
-  float into_angle;  // k (2 - k) g^2 R_T
-  float torque_nm;
-  float moment_nm;
-  float speed_rad_s;
-  float centre_ratio;
-  float speed_variance;
-  float angle_variance;
-  bool speed_valid;
-
-  Shared(const LoadTorqueFilter::Input& in, const LoadTorqueFilter::Noise& noise) noexcept
-      : g(in.duration_s / in.inertia_kg_m2),
-        c(noise.centre_ratio * g),
-        into_speed(g * g * noise.torque_variance),
-        into_both(c * g * noise.torque_variance),
-        into_angle(noise.centre_ratio * (2.0F - noise.centre_ratio) * g * g *
-                   noise.torque_variance),
-        torque_nm(in.torque_nm),
-        moment_nm(in.moment_nm),
-        // No measurement: alpha restarts at 0 with the tick, as if the prediction had been
-        // measured.
-        speed_rad_s(in.speed_valid ? in.speed_rad_s : 0.0F),
-        centre_ratio(noise.centre_ratio),
-        speed_variance(noise.speed_variance),
-        angle_variance(noise.angle_variance),
-        speed_valid(in.speed_valid) {}
-};
-
-// Both are inlined twice, on copies that live in registers: 400 instructions a tick for 530.
-[[gnu::always_inline]] inline void predict(LoadTorqueFilter::Model& m, const Shared& in,
+// Covariance over one tick, (E70) to (E72), of a model that drifts by q2.
+[[gnu::always_inline]] inline void predict(std::array<float, 6>& covariance, float g,
+                                           const LoadTorqueFilter::Noise& noise,
                                            float q2) noexcept {
-  auto& [aa, aw, at, ww, wt, tt] = m.covariance;
-  tt += q2;  // (E70)
+  auto [aa, aw, at, ww, wt, tt] = covariance;
+  const float k = noise.centre_ratio;
+  const float c = k * g;
+  const float push = g * g * noise.torque_variance;  // of the torque's noise into the speed
+  tt += q2;                                          // (E70)
   // w+ = w - g tau+, (E71)
-  const float ww1 = ww - in.g * (2.0F * wt - in.g * tt) + in.into_speed;
-  const float wt1 = wt - in.g * tt;
-  const float aw1 = aw - in.g * at;
+  const float ww1 = ww - g * (2.0F * wt - g * tt) + push;
+  const float wt1 = wt - g * tt;
+  const float aw1 = aw - g * at;
   // alpha+ = alpha + w+ + c tau+, (E72); torque noise enters w+ and leaves by -k.
-  const float aw2 = aw1 + ww1 + in.c * wt1 - in.into_both;
-  const float at2 = at + wt1 + in.c * tt;
-  aa += 2.0F * (aw1 + in.c * at) + ww1 + in.c * (2.0F * wt1 + in.c * tt) + in.speed_variance -
-        in.into_angle;
-  aw = aw2;
-  at = at2;
-  ww = ww1;
-  wt = wt1;
-
-  const float acceleration = in.g * (in.torque_nm - m.mean[2]);
-  m.mean[1] += acceleration;
-  m.mean[0] += m.mean[1] - in.g * (in.moment_nm - in.centre_ratio * m.mean[2]) - in.speed_rad_s;
+  aa += 2.0F * (aw1 + c * at) + ww1 + c * (2.0F * wt1 + c * tt) + noise.speed_variance -
+        k * (2.0F - k) * push;
+  covariance = {aa, aw1 + ww1 + c * wt1 - k * push, at + wt1 + c * tt, ww1, wt1, tt};
 }
 
-[[gnu::always_inline]] inline Innovation correct(LoadTorqueFilter::Model& m,
-                                                 float angle_variance) noexcept {
-  auto& [aa, aw, at, ww, wt, tt] = m.covariance;
+// What the measurement of alpha leaves, and the gains of it, (E73).
+[[gnu::always_inline]] inline void correct(Model& m, float angle_variance) noexcept {
+  auto [aa, aw, at, ww, wt, tt] = m.covariance;
   const float s = aa + angle_variance;
-  const float r = -m.mean[0];
-  const float inverse = s > 0.0F ? 1.0F / s : 0.0F;
-  const float ka = aa * inverse;
-  const float kw = aw * inverse;
-  const float kt = at * inverse;
-  m.mean[0] += ka * r;
-  m.mean[1] += kw * r;
-  m.mean[2] += kt * r;
-  ww -= kw * aw;
-  wt -= kw * at;
-  tt -= kt * at;
-  const float keep = angle_variance * inverse;  // 1 - ka without cancellation
-  aa *= keep;
-  aw *= keep;
-  at *= keep;
+  const float certainty = s > 0.0F ? 1.0F / s : 0.0F;
+  const float keep = angle_variance * certainty;  // 1 - K_a without cancellation
+  const float speed = aw * certainty;
+  const float torque = at * certainty;
+  ww -= speed * aw;
+  wt -= speed * at;
+  tt -= torque * at;
   if (!(ww > 0.0F)) ww = 0.0F;
   if (!(tt > 0.0F)) tt = 0.0F;
-  return {.value = r, .variance = s};
-}
-
-// One model through the tick: mixed, predicted, corrected.
-[[gnu::always_inline]] inline Innovation advance(LoadTorqueFilter::Model& model,
-                                                 const std::array<float, 3>& from,
-                                                 const std::array<float, 3>& apart, float share,
-                                                 const Shared& in, float q2) noexcept {
-  LoadTorqueFilter::Model m{
-      .mean = {from[0] + share * apart[0], from[1] + share * apart[1], from[2] + share * apart[2]},
-      .covariance = model.covariance};
-  predict(m, in, q2);
-  Innovation innovation{};
-  if (in.speed_valid) {
-    innovation = correct(m, in.angle_variance);
-  } else {
-    m.mean[0] = 0.0F;
-    m.covariance[0] = m.covariance[1] = m.covariance[2] = 0.0F;
-  }
-  model = m;
-  return innovation;
+  m.gains = {.keep = keep, .speed = speed, .torque = torque, .certainty = certainty};
+  m.covariance = {aa * keep, aw * keep, at * keep, ww, wt, tt};
 }
 
 }  // namespace
@@ -129,65 +58,54 @@ void LoadTorqueFilter::start(float speed_rad_s, float speed_sigma_rad_s, float t
                     0.0F, torque_sigma_nm * torque_sigma_nm};
   }
   state_.edge_probability = 0.5F;
-  state_.started = 1;
+  state_.ticks = 1;
 }
 
 void LoadTorqueFilter::loosen(float torque_sigma_nm) noexcept {
   for (Model& m : state_.models) m.covariance[5] += torque_sigma_nm * torque_sigma_nm;
+  if (state_.ticks > 1) state_.ticks = 1;
 }
 
-auto LoadTorqueFilter::step(const Input& input, const Noise& noise) noexcept -> Output {
-  if (state_.started == 0) start(input.speed_rad_s, 1.0F, input.torque_nm, config_.rated_torque_nm);
+[[gnu::noinline]] void LoadTorqueFilter::renew(Model& model, float q2, float g,
+                                               Noise noise) noexcept {
+  const float before = model.gains.certainty;
+  predict(model.covariance, g, noise, q2);
+  correct(model, noise.angle_variance);
+  // The noise is another than a while ago: the recursions settle anew.
+  if (magnitude(model.gains.certainty - before) > kUnsettled_ratio * before &&
+      state_.ticks > kResettling)
+    state_.ticks = kResettling;
+  const float quiet = state_.models[0].gains.certainty;
+  const float edge = state_.models[1].gains.certainty;
+  state_.likelihood_ratio = quiet > 0.0F ? std::sqrt(edge / quiet) : 1.0F;
+}
 
-  Model& quiet = state_.models[0];
-  Model& edge = state_.models[1];
-  // Mix before the step: each model starts from the weighted mean, (E74).
-  const float mu_e = state_.edge_probability;
-  const float mu_q = 1.0F - mu_e;
-  const float edge_prior = mu_e * kStayEdge_ratio + mu_q * (1.0F - kStayQuiet_ratio);
-  const float quiet_prior = 1.0F - edge_prior;
-  const float into_quiet = mu_e * (1.0F - kStayEdge_ratio) / quiet_prior;  // share of edge
-  const float into_edge = mu_e * kStayEdge_ratio / edge_prior;
-  const auto difference = [&](std::size_t k) { return edge.mean[k] - quiet.mean[k]; };
-  const std::array<float, 3> apart{difference(0), difference(1), difference(2)};
-
-  const Shared shared(input, noise);
-  const float q_edge = config_.edge_slope_1_s * input.duration_s * config_.rated_torque_nm;
-  const float q_quiet2 = config_.drift_1_sqrt_s * config_.drift_1_sqrt_s * input.duration_s *
-                         config_.rated_torque_nm * config_.rated_torque_nm;
+// No measurement: alpha begins anew at 0 with the next tick, as if the prediction had been
+// measured.
+[[gnu::noinline]] auto LoadTorqueFilter::only_predict(const Input& in, const Noise& noise) noexcept
+    -> Output {
+  const Prior prior(state_.edge_probability);
+  auto& [quiet, edge] = state_.models;
+  const float g = in.duration_s / in.inertia_kg_m2;
+  const float rated = config_.rated_torque_nm;
+  const float drift = config_.drift_1_sqrt_s * rated;
+  const float slope = config_.edge_slope_1_s * rated * in.duration_s;
   const std::array<float, 3> from = quiet.mean;
-  const Innovation of_quiet = advance(quiet, from, apart, into_quiet, shared, q_quiet2);
-  const Innovation of_edge = advance(edge, from, apart, into_edge, shared, q_edge * q_edge);
-
-  float consistency = 1.0F;
-  if (!input.speed_valid) {
-    state_.edge_probability = edge_prior;
-  } else if (of_quiet.variance > 0.0F && of_edge.variance > 0.0F) {
-    const float quiet_misfit = of_quiet.value * of_quiet.value / of_quiet.variance;
-    const float edge_misfit = of_edge.value * of_edge.value / of_edge.variance;
-    // The ratio of likelihoods, exp(l) sqrt(s_q / s_e): a root for the logarithm of it.
-    float l = 0.5F * (quiet_misfit - edge_misfit);
-    if (l > kLargestLogRatio) l = kLargestLogRatio;
-    if (!(l > -kLargestLogRatio)) l = -kLargestLogRatio;
-    const float weighted =
-        edge_prior * exp_bounded(l) * std::sqrt(of_quiet.variance / of_edge.variance);
-    float p = weighted / (quiet_prior + weighted);
-    if (p > 1.0F - kSmallestProbability) p = 1.0F - kSmallestProbability;
-    if (!(p > kSmallestProbability)) p = kSmallestProbability;
-    state_.edge_probability = p;
-    consistency = (1.0F - p) * of_quiet.value * of_quiet.value / of_quiet.variance +
-                  p * of_edge.value * of_edge.value / of_edge.variance;
-  }
-
-  const float p = state_.edge_probability;
-  const float spread = edge.mean[2] - quiet.mean[2];
-  return {.load_torque_nm = quiet.mean[2] + p * spread,
-          .variance_nm2 = (1.0F - p) * quiet.covariance[5] + p * edge.covariance[5] +
-                          p * (1.0F - p) * spread * spread,
-          .speed_rad_s = quiet.mean[1] + p * (edge.mean[1] - quiet.mean[1]),
-          .edge_probability = p,
-          .consistency_ratio = consistency,
-          .innovation_rad_s = of_quiet.value};
+  const auto mixed = [&](std::size_t k, float share) {
+    return from[k] + share * (state_.models[1].mean[k] - from[k]);
+  };
+  const float quiet_nm = mixed(2, prior.into_quiet);
+  const float edge_nm = mixed(2, prior.into_edge);
+  const float quiet_rad_s = mixed(1, prior.into_quiet);
+  const float edge_rad_s = mixed(1, prior.into_edge);
+  quiet.mean = {0.0F, quiet_rad_s + g * (in.torque_nm - quiet_nm), quiet_nm};
+  edge.mean = {0.0F, edge_rad_s + g * (in.torque_nm - edge_nm), edge_nm};
+  predict(quiet.covariance, g, noise, drift * drift * in.duration_s);
+  predict(edge.covariance, g, noise, slope * slope);
+  for (Model& m : state_.models) m.covariance[0] = m.covariance[1] = m.covariance[2] = 0.0F;
+  state_.edge_probability = prior.edge;
+  state_.ticks = 1;
+  return mixture(1.0F, 0.0F);
 }
 
 }  // namespace cutforce::estimator

@@ -3,31 +3,12 @@
 #include <cmath>
 #include <cstddef>
 
+#include "estimator/polynomials.hpp"
+
 namespace cutforce::estimator {
 namespace {
 
 constexpr float kTurn = 6.28318531F;
-
-struct CosineSine {
-  float cosine;
-  float sine;
-};
-
-// Taylor at a quarter of the angle, doubled twice. Within |x| <= pi the remainders, x^10/10! and
-// x^11/11! at pi/4, are below 3e-8; rounding of the doublings dominates.
-constexpr CosineSine cosine_sine(float angle_rad) noexcept {
-  const float x = 0.25F * angle_rad;
-  const float q = x * x;
-  float s = x * (1.0F + q * (-1.0F / 6.0F +
-                             q * (1.0F / 120.0F + q * (-1.0F / 5040.0F + q * (1.0F / 362880.0F)))));
-  float c = 1.0F + q * (-0.5F + q * (1.0F / 24.0F + q * (-1.0F / 720.0F + q * (1.0F / 40320.0F))));
-  for (int doubling = 0; doubling < 2; ++doubling) {
-    const float doubled = 2.0F * s * c;
-    c = 1.0F - 2.0F * s * s;
-    s = doubled;
-  }
-  return {c, s};
-}
 
 constexpr float wrapped(float angle_rad) noexcept {
   const float turns = angle_rad * (1.0F / kTurn);

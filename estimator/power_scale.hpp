@@ -41,6 +41,8 @@ class PowerScale {
     float gain = 1.0F;
     float variance = 0.0F;
     std::uint32_t started = 0;
+    float time_s = 0.0F;  // since the last comparison
+    std::uint32_t ticks = 0;
   };
 
   [[nodiscard]] static constexpr std::expected<PowerScale, ConfigError> make(
@@ -49,54 +51,69 @@ class PowerScale {
     return PowerScale{config};
   }
 
-  // power_w: mean input power of the tick; meter_w: the reading at its end.
+  // power_w: mean input power of the tick; meter_w: the reading at its end. The two are compared
+  // with every eighth tick: readings within 0.1 s are one anyway.
   constexpr void step(float power_w, float meter_w, float duration_s) noexcept {
-    if (state_.started == 0) {
+    if (state_.started == 0) [[unlikely]] {
       state_.lagged_w = meter_w;
-      state_.variance = config_.gain_sigma_ratio * config_.gain_sigma_ratio;
       state_.started = 1;
     }
-    const float share = duration_s < config_.lag_s ? duration_s / config_.lag_s : 1.0F;
+    const float share = duration_s < config_.lag_s ? duration_s * per_lag_1_s_ : 1.0F;
     state_.lagged_w += share * (power_w - state_.lagged_w);
-    if (!(state_.lagged_w > kSmallestPower_ratio * config_.rated_power_w)) return;
-    const float off = meter_w / state_.lagged_w - 1.0F;
-    if (!(off < config_.implausible_ratio && off > -config_.implausible_ratio)) return;
-    // While the power still moves, an error of the lag shows as an error of the scale.
-    const float moving = (power_w - state_.lagged_w) / state_.lagged_w;
-    const float from_lag = kLagError_ratio * moving;
-    const float noise =
-        (config_.meter_sigma_ratio * config_.meter_sigma_ratio + from_lag * from_lag) *
-        kCorrelation_s / duration_s;
-    const float gain = state_.variance / (state_.variance + noise);
-    state_.gain += gain * (1.0F + off - state_.gain);
-    state_.variance *= 1.0F - gain;
-    const float floor = config_.meter_sigma_ratio * config_.meter_sigma_ratio;
-    const float least = floor < config_.gain_sigma_ratio * config_.gain_sigma_ratio
-                            ? floor
-                            : config_.gain_sigma_ratio * config_.gain_sigma_ratio;
-    if (state_.variance < least) state_.variance = least;
+    state_.time_s += duration_s;
+    if ((++state_.ticks & (kTicks - 1)) != 0) [[likely]]
+      return;
+    compare(power_w, meter_w, state_.time_s);
+    state_.time_s = 0.0F;
   }
 
   // Without what the meter's own uncertainty explains: a check, not a second source.
-  [[nodiscard]] constexpr float gain_ratio() const noexcept {
-    const float off = state_.gain - 1.0F;
-    const float excused = kExcused_sigmas * config_.meter_sigma_ratio;
-    if (off > excused) return 1.0F + (off - excused);
-    return off < -excused ? 1.0F + (off + excused) : 1.0F;
-  }
+  [[nodiscard]] constexpr float gain_ratio() const noexcept { return 1.0F + excess_ratio_; }
+  [[nodiscard]] constexpr float excess_ratio() const noexcept { return excess_ratio_; }  // g - 1
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
-  constexpr void restore(const State& state) noexcept { state_ = state; }
+  constexpr void restore(const State& state) noexcept {
+    state_ = state;
+    find_excess();
+  }
 
  private:
+  static constexpr std::uint32_t kTicks = 8;
   static constexpr float kExcused_sigmas = 0.4F;
   static constexpr float kSmallestPower_ratio = 0.2F;
   static constexpr float kLagError_ratio = 0.1F;
   static constexpr float kCorrelation_s = 0.1F;  // readings within it are one
 
-  explicit constexpr PowerScale(const Config& config) noexcept : config_(config) {}
+  explicit constexpr PowerScale(const Config& config) noexcept
+      : per_lag_1_s_(1.0F / config.lag_s), config_(config) {
+    state_.variance = config.gain_sigma_ratio * config.gain_sigma_ratio;
+  }
 
-  Config config_;
+  [[gnu::noinline]] constexpr void compare(float power_w, float meter_w, float time_s) noexcept {
+    if (!(state_.lagged_w > kSmallestPower_ratio * config_.rated_power_w)) return;
+    const float off = meter_w / state_.lagged_w - 1.0F;
+    if (!(off < config_.implausible_ratio && off > -config_.implausible_ratio)) return;
+    // While the power still moves, an error of the lag shows as an error of the scale.
+    const float from_lag = kLagError_ratio * (power_w - state_.lagged_w) / state_.lagged_w;
+    const float least = config_.meter_sigma_ratio * config_.meter_sigma_ratio;
+    const float noise = (least + from_lag * from_lag) * kCorrelation_s / time_s;
+    const float gain = state_.variance / (state_.variance + noise);
+    state_.gain += gain * (1.0F + off - state_.gain);
+    state_.variance *= 1.0F - gain;
+    const float prior = config_.gain_sigma_ratio * config_.gain_sigma_ratio;
+    const float floor = least < prior ? least : prior;
+    if (state_.variance < floor) state_.variance = floor;
+    find_excess();
+  }
+  constexpr void find_excess() noexcept {
+    const float off = state_.gain - 1.0F;
+    const float excused = kExcused_sigmas * config_.meter_sigma_ratio;
+    excess_ratio_ = off > excused ? off - excused : (off < -excused ? off + excused : 0.0F);
+  }
+
+  float excess_ratio_ = 0.0F;
+  float per_lag_1_s_;
   State state_{};
+  Config config_;
 };
 
 static_assert(std::is_trivially_copyable_v<PowerScale>);

@@ -21,31 +21,24 @@ void RunUpInertia::forget_episode() noexcept {
   state_.calibrated = 1;
 }
 
-void RunUpInertia::step(const Input& in) noexcept {
+void RunUpInertia::gather(float torque_nm, float speed_rad_s, float duration_s,
+                          bool calibrated) noexcept {
   State& s = state_;
-  if (!in.valid || in.in_cut) {
-    s.seen = 0;
-    forget_episode();
-    return;
-  }
-  if (in.idle) {
-    close(in.tare_nm);
-    forget_episode();
-  } else if (s.seen != 0) {
-    const float sign = in.speed_rad_s < 0.0F ? -1.0F : 1.0F;
-    const float friction =
-        config_.coulomb_torque_nm * sign + config_.viscous_nm_s_rad * in.speed_rad_s;
-    s.impulse_nm_s += (in.torque_nm - friction) * in.duration_s;
-    s.gained_rad_s += in.speed_rad_s - s.last_speed_rad_s;
-    s.time_s += in.duration_s;
-    s.turned_rad += in.speed_rad_s * sign * in.duration_s;
-    if (!in.calibrated) s.calibrated = 0;
-  }
-  s.seen = 1;
-  s.last_speed_rad_s = in.speed_rad_s;
+  const float sign = speed_rad_s < 0.0F ? -1.0F : 1.0F;
+  const float friction = config_.coulomb_torque_nm * sign + config_.viscous_nm_s_rad * speed_rad_s;
+  s.impulse_nm_s += (torque_nm - friction) * duration_s;
+  s.gained_rad_s += speed_rad_s - s.last_speed_rad_s;
+  s.time_s += duration_s;
+  s.turned_rad += speed_rad_s * sign * duration_s;
+  if (!calibrated) s.calibrated = 0;
 }
 
 void RunUpInertia::close(float tare_nm) noexcept {
+  find(tare_nm);
+  forget_episode();
+}
+
+void RunUpInertia::find(float tare_nm) noexcept {
   State& s = state_;
   const float gained = magnitude(s.gained_rad_s);
   if (!(gained > 0.0F && s.time_s > 0.0F)) return;

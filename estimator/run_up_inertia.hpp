@@ -61,7 +61,29 @@ class RunUpInertia {
 
   [[nodiscard]] static constexpr std::expected<RunUpInertia, ConfigError> make(
       const Config& config) noexcept;
-  void step(const Input& input) noexcept;
+  // In the cut there is nothing to do, in idle only the speed to keep.
+  [[gnu::always_inline]] void step(const Input& in) noexcept {
+    State& s = state_;
+    if (!in.valid || in.in_cut) {
+      lose();
+      return;
+    }
+    if (in.idle) {
+      if (s.time_s > 0.0F) [[unlikely]]
+        close(in.tare_nm);
+    } else if (s.seen != 0) {
+      gather(in.torque_nm, in.speed_rad_s, in.duration_s, in.calibrated);
+    }
+    s.seen = 1;
+    s.last_speed_rad_s = in.speed_rad_s;
+  }
+
+  // The episode is worth nothing.
+  [[gnu::always_inline]] void lose() noexcept {
+    if (state_.seen == 0) return;
+    state_.seen = 0;
+    forget_episode();
+  }
 
   [[nodiscard]] float inertia_kg_m2() const noexcept { return state_.inertia_kg_m2; }
   [[nodiscard]] float sigma_ratio() const noexcept { return state_.sigma_ratio; }
@@ -70,11 +92,13 @@ class RunUpInertia {
 
  private:
   explicit constexpr RunUpInertia(const Config& config) noexcept;
+  void gather(float torque_nm, float speed_rad_s, float duration_s, bool calibrated) noexcept;
   void close(float tare_nm) noexcept;
+  void find(float tare_nm) noexcept;
   void forget_episode() noexcept;
 
-  Config config_;
   State state_{};
+  Config config_;
 };
 
 constexpr auto RunUpInertia::make(const Config& config) noexcept

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <type_traits>
 
 #include "estimator/polynomials.hpp"
@@ -18,52 +19,43 @@ class SpeedRipple {
  public:
   struct State {
     std::array<float, 4> amplitude_rad_s{};  // a_1, b_1, a_2, b_2
-    float cosine = 1.0F;                     // of theta
-    float sine = 0.0F;
-    float rest_variance = 0.0F;  // of what was learned from
+    std::uint32_t turn = 0;                  // theta, 2^32 of it a turn
+    float rest_variance = 0.0F;              // of what was learned from
     float learned_s = 0.0F;
+    std::uint32_t applies = 0;
   };
 
   // Error of the speed measured over the tick that turns the shaft by speed_rad_s * duration_s.
   [[nodiscard]] constexpr float step(float speed_rad_s, float duration_s) noexcept {
     const float angle = speed_rad_s * duration_s;
-    if (!(angle < kLargestAngle_rad && angle > -kLargestAngle_rad)) return 0.0F;
-    const float c = cos_small(angle);
-    const float s = sin_small(angle);
-    const float x = state_.cosine * c - state_.sine * s;
-    const float y = state_.sine * c + state_.cosine * s;
-    const float scale = 1.5F - 0.5F * (x * x + y * y);
-    state_.cosine = scale * x;
-    state_.sine = scale * y;
-    return applies() ? value() : 0.0F;
+    if (!(magnitude(angle) < kLargestAngle_rad)) return 0.0F;
+    state_.turn += static_cast<std::uint32_t>(static_cast<std::int32_t>(angle * kPerRadian));
+    return state_.applies != 0 ? dot(state_.amplitude_rad_s, waves()) : 0.0F;
   }
 
   // rest_rad_s: unexplained speed of the tick just stepped, before any ripple was taken off.
   constexpr void learn(float rest_rad_s, float duration_s) noexcept {
-    const float error = rest_rad_s - value();
+    const Waves wave = waves();
+    const float error = rest_rad_s - dot(state_.amplitude_rad_s, wave);
     const float time_s = state_.learned_s < kTime_s ? state_.learned_s + duration_s : kTime_s;
     const float gain = 2.0F * duration_s / (time_s > 0.1F ? time_s : 0.1F);
-    const float c2 = state_.cosine * state_.cosine - state_.sine * state_.sine;
-    const float s2 = 2.0F * state_.cosine * state_.sine;
-    state_.amplitude_rad_s[0] += gain * error * state_.cosine;
-    state_.amplitude_rad_s[1] += gain * error * state_.sine;
-    state_.amplitude_rad_s[2] += gain * error * c2;
-    state_.amplitude_rad_s[3] += gain * error * s2;
+    float power = 0.0F;
+    for (std::size_t k = 0; k < wave.size(); ++k) {
+      float& a = state_.amplitude_rad_s[k];
+      a += gain * error * wave[k];
+      power += a * a;
+    }
     state_.rest_variance += 0.5F * gain * (error * error - state_.rest_variance);
     state_.learned_s += duration_s;
     if (state_.learned_s > kLongest_s) state_.learned_s = kLongest_s;
+    const bool stands_out = power > kStandsOut_ratio * state_.rest_variance;
+    state_.applies = state_.learned_s > kTime_s && stands_out ? 1U : 0U;
   }
 
   // The shaft was lost (a gap, standstill): the phase is unknown.
   constexpr void forget() noexcept { state_ = State{}; }
 
-  [[nodiscard]] constexpr bool applies() const noexcept {
-    if (!(state_.learned_s > kTime_s)) return false;
-    float power = 0.0F;
-    for (const float a : state_.amplitude_rad_s) power += a * a;
-    return power > kStandsOut_ratio * state_.rest_variance;
-  }
-
+  [[nodiscard]] constexpr bool applies() const noexcept { return state_.applies != 0; }
   [[nodiscard]] constexpr const State& state() const noexcept { return state_; }
   constexpr void restore(const State& state) noexcept { state_ = state; }
 
@@ -73,11 +65,17 @@ class SpeedRipple {
   static constexpr float kLargestAngle_rad = 0.8F;
   static constexpr float kStandsOut_ratio = 0.5F;
 
-  [[nodiscard]] constexpr float value() const noexcept {
-    const auto& a = state_.amplitude_rad_s;
-    const float c2 = state_.cosine * state_.cosine - state_.sine * state_.sine;
-    const float s2 = 2.0F * state_.cosine * state_.sine;
-    return a[0] * state_.cosine + a[1] * state_.sine + a[2] * c2 + a[3] * s2;
+  static constexpr float kPerRadian = 4294967296.0F / 6.28318530718F;
+
+  using Waves = std::array<float, 4>;  // cos theta, sin theta, cos 2 theta, sin 2 theta
+
+  [[nodiscard]] constexpr Waves waves() const noexcept {
+    const auto half_turns = static_cast<float>(static_cast<std::int32_t>(state_.turn));
+    const auto [c, s] = cosine_sine(half_turns * (1.0F / kPerRadian));
+    return {c, s, c * c - s * s, 2.0F * c * s};
+  }
+  [[nodiscard]] static constexpr float dot(const Waves& a, const Waves& b) noexcept {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
   }
 
   State state_{};

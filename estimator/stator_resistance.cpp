@@ -14,26 +14,19 @@ constexpr float kSlipNoise_rad_s = 0.02F;   // of a block's mean
 constexpr float kSteady_ratio = 0.02F;      // torque may move by this much of rated within a block
 constexpr float kScatterShare = 0.2F;
 constexpr float kScatterCount = 12.0F;  // slow noise: blocks are not independent
-constexpr float kStandsOut_sigmas = 1.6F;
 
 }  // namespace
 
 void StatorResistance::step(const Input& in) noexcept {
   auto& s = state_.sums;
-  // The copper term of the idle must stand out of what the iron loss may be.
-  const float speed_ratio = magnitude(in.frequency_rad_s) / config_.rated_frequency_rad_s;
-  const float copper = config_.resistance_sigma_ratio * config_.stator_resistance_ohm *
-                       magnitude(in.idle_copper_nm_ohm);
-  if (!(copper > kStandsOut_sigmas * config_.iron_torque_sigma_nm * speed_ratio)) {
-    s.fill(0.0F);
-    state_.blocks = 0;
+  if (!stands_out(in.idle_copper_nm_ohm, in.frequency_rad_s)) {
+    pause();
     return;
   }
   const float moved = in.torque_nm - state_.first_torque_nm;
   const float limit = kSteady_ratio * config_.rated_torque_nm;
   if (!in.steady || moved > limit || moved < -limit) {
-    s.fill(0.0F);
-    state_.blocks = 0;
+    forget();
     state_.first_torque_nm = in.torque_nm;
     if (!in.steady) return;
   }

@@ -19,6 +19,8 @@
 #include <expected>
 #include <type_traits>
 
+#include "estimator/polynomials.hpp"
+
 namespace cutforce::estimator {
 
 class StatorResistance {
@@ -72,6 +74,15 @@ class StatorResistance {
   [[nodiscard]] static constexpr std::expected<StatorResistance, ConfigError> make(
       const Config& config) noexcept;
   void step(const Input& input) noexcept;
+  // Whether the copper term of the idle stands out of what the iron loss may be; else step() is
+  // pause().
+  [[nodiscard]] bool stands_out(float idle_copper_nm_ohm, float frequency_rad_s) const noexcept {
+    return magnitude(idle_copper_nm_ohm) > least_copper_ * magnitude(frequency_rad_s);
+  }
+  [[gnu::always_inline]] void pause() noexcept {
+    if (state_.sums[5] != 0.0F || state_.blocks != 0) [[unlikely]]
+      forget();
+  }
 
   // Found anew with each block only, asked for several times a tick.
   [[nodiscard]] float change_ohm() const noexcept { return change_ohm_; }  // within -50 and +100 %
@@ -87,14 +98,21 @@ class StatorResistance {
   static constexpr float kLargestRise_ratio = 1.0F;  // of the resistance in use
   static constexpr float kLargestFall_ratio = 0.5F;
 
+  static constexpr float kStandsOut_sigmas = 1.6F;
+
   explicit constexpr StatorResistance(const Config& config) noexcept;
+  void forget() noexcept {
+    state_.sums.fill(0.0F);
+    state_.blocks = 0;
+  }
   void learn() noexcept;
   constexpr void find_change() noexcept;
 
-  Config config_;
   float change_ohm_ = 0.0F;  // dR
   float change_sigma_ohm_ = 0.0F;
+  float least_copper_;  // over the frequency
   State state_{};
+  Config config_;
 };
 
 constexpr auto StatorResistance::make(const Config& config) noexcept
@@ -103,7 +121,11 @@ constexpr auto StatorResistance::make(const Config& config) noexcept
   return StatorResistance{config};
 }
 
-constexpr StatorResistance::StatorResistance(const Config& config) noexcept : config_(config) {
+constexpr StatorResistance::StatorResistance(const Config& config) noexcept
+    : least_copper_(kStandsOut_sigmas * config.iron_torque_sigma_nm /
+                    (config.rated_frequency_rad_s * config.resistance_sigma_ratio *
+                     config.stator_resistance_ohm)),
+      config_(config) {
   const float a = config.rotor_resistance_ohm / (1.5F * config.pole_pairs);
   const float sa = config.rotor_sigma_ratio * a;
   const float sr = a * config.resistance_sigma_ratio * config.stator_resistance_ohm;

@@ -112,7 +112,7 @@ TEST(AirCut, TaresInTheAirAfterTheRunUpInBothDirections) {
     EXPECT_EQ(spindle.output.phase, Phase::kIdle);
     EXPECT_TRUE(spindle.output.has_tare);
     EXPECT_NEAR(spindle.tare_error(), 0.0, 0.001 * kRated) << sense;
-    EXPECT_LT(spindle.output.tare_sigma_nm, 0.002 * kRated);
+    EXPECT_LT(std::sqrt(spindle.output.tare_variance_nm2), 0.002 * kRated);
     EXPECT_FALSE(spindle.ever_cut);
     spindle.run(20.0);
     EXPECT_FALSE(spindle.ever_cut);
@@ -199,7 +199,7 @@ TEST(AirCut, NeverTaresWhatItFindsItselfInACutWith) {
   EXPECT_EQ(spindle.output.phase, Phase::kCut);
   EXPECT_FALSE(spindle.output.has_tare);
   EXPECT_EQ(spindle.output.tare_nm, 0.0F);
-  EXPECT_GT(spindle.output.tare_sigma_nm, 0.005 * kRated);  // friction is unknown
+  EXPECT_GT(std::sqrt(spindle.output.tare_variance_nm2), 0.005 * kRated);  // friction is unknown
   spindle.cut = 0.0;
   EXPECT_LT(spindle.until(Phase::kIdle, 3.0), 2.0);
   spindle.run(1.0);
@@ -242,10 +242,10 @@ TEST(AirCut, DoesNotTareBeforeTheChannelsAreCalibrated) {
 
 TEST(AirCut, AgesItsTareOutsideTheAir) {
   auto spindle = after_run_up();
-  const float fresh = spindle.output.tare_sigma_nm;
+  const float fresh = std::sqrt(spindle.output.tare_variance_nm2);
   spindle.cut = 0.4 * kRated;
   spindle.run(20.0);
-  EXPECT_GT(spindle.output.tare_sigma_nm, fresh + 5e-4F * 14.6F);
+  EXPECT_GT(std::sqrt(spindle.output.tare_variance_nm2), fresh + 5e-4F * 14.6F);
 }
 
 TEST(AirCut, StaysUnsteadyWhileNoTorqueCanBeTold) {
@@ -293,7 +293,7 @@ TEST(AirCut, StaysFiniteUnderRandomInput) {
                                     .valid = k % 3001 > 5});
     ASSERT_LT(std::abs(output.net_torque_nm), 200.0F) << k;
     ASSERT_LT(std::abs(output.tare_nm), 100.0F) << k;
-    ASSERT_TRUE(output.tare_sigma_nm >= 0.0F && output.tare_sigma_nm < 100.0F) << k;
+    ASSERT_TRUE(output.tare_variance_nm2 >= 0.0F && output.tare_variance_nm2 < 1e4F) << k;
     ASSERT_TRUE(output.idle_variance_nm2 >= 0.0F && output.idle_variance_nm2 < 1e5F) << k;
   }
 }

@@ -193,6 +193,33 @@ TEST(LoadTorqueFilter, AgreesWithAKalmanFilterInMatricesForBothKindsOfNoise) {
   }
 }
 
+// The recursions run in turns once they have settled; where the noise steps or a start comes in
+// between, the filter must not know the difference for long.
+TEST(LoadTorqueFilter, KeepsToTheRecursionThatRunsWithEveryTickWhereTheNoiseSteps) {
+  std::mt19937 random(17);
+  std::normal_distribution<double> normal;
+  auto filter = LoadTorqueFilter::make(kSpindle).value();
+  filter.start(150.0F, 1.0F, 2.0F, 14.6F);
+  Reference reference(150.0, 2.0);
+  Shaft shaft(150.0);
+  for (int k = 0; k < 6000; ++k) {
+    LoadTorqueFilter::Noise noise = kWhite;
+    noise.speed_variance *= k / 1000 % 2 == 0 ? 1.0F : 4.0F;
+    noise.torque_variance *= k / 1500 % 2 == 0 ? 1.0F : 2.0F;
+    const double sigma = std::sqrt(static_cast<double>(noise.speed_variance));
+    const double load = 2.0 + std::sin(0.003 * k);
+    const double speed = shaft.tick(load, load, load, false) + sigma * normal(random);
+    const auto input = input_of(load, speed, 0.4);
+    const auto output = filter.step(input, noise);
+    reference.step(input, noise);
+    const bool stepped = k % 500 < 200 && k > 500;
+    ASSERT_NEAR(output.load_torque_nm, reference.torque(), (stepped ? 4e-3 : 2.5e-3) * kRated) << k;
+    ASSERT_NEAR(std::sqrt(output.variance_nm2), std::sqrt(reference.variance()),
+                (stepped ? 4e-3 : 2.5e-3) * kRated)
+        << k;
+  }
+}
+
 // With R_a = 0 the angle is known with every tick, and what remains is the filter on the speed.
 // Its measurement shares torque noise with the prediction, so their covariance is in the gain.
 TEST(LoadTorqueFilter, WithoutAngleNoiseIsTheTwoStateFilterOnSpeed) {

@@ -18,6 +18,8 @@ namespace {
 using estimator::angle_of;
 using estimator::atan_small;
 using estimator::cos_small;
+using estimator::cosine_sine;
+using estimator::exp2_coarse;
 using estimator::exp_bounded;
 using estimator::log_positive;
 using estimator::sin_small;
@@ -83,6 +85,13 @@ TEST(Polynomials, SineAndCosineStayWithinTheirBound) {
   EXPECT_LE(worst_up_to(0.8F, Kind::kAbsolute, sin_small, sine), 8e-8);
   EXPECT_BOUND(worst_up_to(0.8F, Kind::kAbsolute, cos_small, cosine), 8e-8);
   EXPECT_EQ(sin_small(-0.7F), -sin_small(0.7F));
+  const float pi = std::numbers::pi_v<float>;
+  EXPECT_LE(worst_up_to(
+                pi, Kind::kAbsolute, [](float x) { return cosine_sine(x).sine; }, sine),
+            1e-6);
+  EXPECT_LE(worst_up_to(
+                pi, Kind::kAbsolute, [](float x) { return cosine_sine(x).cosine; }, cosine),
+            1e-6);
 }
 
 TEST(Polynomials, ExponentialStaysWithinItsBoundOnBothSides) {
@@ -92,6 +101,26 @@ TEST(Polynomials, ExponentialStaysWithinItsBoundOnBothSides) {
                    87.0F, Kind::kRelative, [](float x) { return exp_bounded(-x); },
                    [](double x) { return std::exp(-x); }),
                9e-8);
+}
+
+TEST(Polynomials, CoarsePowerOfTwoStaysWithinItsBoundOnBothSides) {
+  const auto power = [](double x) { return std::exp2(x); };
+  EXPECT_BOUND(worst_up_to(120.0F, Kind::kRelative, exp2_coarse, power), 8e-5);
+  EXPECT_BOUND(worst_up_to(
+                   120.0F, Kind::kRelative, [](float x) { return exp2_coarse(-x); },
+                   [](double x) { return std::exp2(-x); }),
+               8e-5);
+  EXPECT_TRUE(std::isnormal(exp2_coarse(-120.0F)) && std::isfinite(exp2_coarse(120.0F)));
+}
+
+// Of vectors that follow one another the octant is not looked for: no bit may differ.
+TEST(Polynomials, AngleOfNearVectorsIsThatOfTheOctant) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> draw(-0.4142F, 0.4142F);
+  for (int k = 0; k < 200'000; ++k) {
+    const float y = draw(random);
+    ASSERT_EQ(angle_of(1.0F, y), atan_small(y));
+  }
 }
 
 TEST(Polynomials, ExponentialIsClampedAndNeverInfinite) {

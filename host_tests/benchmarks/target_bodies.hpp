@@ -66,7 +66,7 @@ class FusedSamples {
   explicit FusedSamples(const firmware::ControlLoop::Config& config)
       : gate_(*estimator::SampleGate::make(config.gate)),
         front_end_(*estimator::FrontEnd::make(config.front_end)),
-        observer_(*estimator::FusedObserver::make(config.fused)) {}
+        observer_(*estimator::FusedObserver::make(calibrated(config.fused))) {}
 
   void step(std::span<const hal::Sample> samples) noexcept {
     firmware::SampleRun run;
@@ -82,6 +82,13 @@ class FusedSamples {
   [[nodiscard]] std::uint32_t taken() const noexcept { return taken_; }
 
  private:
+  // Nobody calibrates the channels here, and an observer that waits for it never gets to a cut.
+  [[nodiscard]] static estimator::FusedObserver::Config calibrated(
+      estimator::FusedObserver::Config config) noexcept {
+    config.calibrate = false;
+    return config;
+  }
+
   estimator::SampleGate gate_;
   estimator::FrontEnd front_end_;
   estimator::FusedObserver observer_;
