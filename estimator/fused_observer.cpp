@@ -89,10 +89,9 @@ void FusedObserver::restart() noexcept {
 }
 
 // Not locked: at what the current turns by first, it must agree.
-[[gnu::noinline]] bool FusedObserver::locks(SpaceVector current_before_a) noexcept {
+[[gnu::noinline]] bool FusedObserver::locks(float current_rad) noexcept {
   const float frequency = tick_.frequency_rad_s;
-  const float seen =
-      rotated(tick_.current_a, current_before_a, frequency * length_.tick_s) * length_.ticks_per_s;
+  const float seen = current_rad * length_.ticks_per_s;
   if (!(magnitude(seen - frequency) < 0.3F * magnitude(frequency) + 20.0F)) return false;
   flux_.seed();
   return true;
@@ -176,10 +175,8 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
     return Output{};
   if (h != length_.tick_s) [[unlikely]]
     renew_length(h);
-  const SpaceVector current_before = tick_.current_a;
   const Rotation r = rotation(window);
-  tick_.current_a = window.current_a;
-  track_frequency(r, current_before);
+  track_frequency(r);
   const Speed speed = take_speed(r, window.torque_nm);
   if (!(tick_.locked_s > kLock_s) || (!speed.valid && tick_.ticks == 0)) [[unlikely]]
     return unlocked(window, speed.mean_rad_s, feed);
@@ -241,7 +238,7 @@ auto FusedObserver::tick(AirCut::Feed feed) noexcept -> Output {
                  .in_cut = air.phase == AirCut::Phase::kCut,
                  .tare_nm = load.speed_rad_s < 0.0F ? -air.tare_nm : air.tare_nm,
                  .calibrated = calibrated});
-  note_even(air.steady, r.seen_rad);
+  note_even(air.steady, r.current_rad);
   const float sigma = sigma_nm(load, air, torque, change);
   learn(window, r, torque, air, speed.mean_rad_s);
   // Channel offsets ripple the angle once a turn of the field: only the mean of turns counts.

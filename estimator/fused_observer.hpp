@@ -4,7 +4,7 @@
 //   frequency  psi_R = psi - L_sigma i;  w_psi = arg(psi_R conj psi_R,prev)/h, w_i likewise (E100)
 //              w_e += s (w_x - w_e) + a_e h,  a_e += s^2/4 (w_x - w_e)/h,  s = 1 - exp(-h/15 ms)
 //              w_x = w_psi once calibrated and agreeing, else w_i (E101)
-//   slow work  in turns: the filter's covariances in one tick of four, the power meter of eight
+//   slow work  the filter's covariances, in one tick of four once they have settled
 //   speed      measured less its ripple, or without a sensor
 //              (w_psi - w_sl)/p, w_sl = 2 R_R T_m / (3 p |psi_R|^2) (E102)
 //   noise      NoiseMeter (E103);  ripple  SpeedRipple (E105)
@@ -214,9 +214,10 @@ class FusedObserver {
     float acceleration_1_s2;  // s^2/4/h
   };
   struct Rotation {
-    float seen_rad;  // that the vector which is believed turned by
-    float flux_squared;
+    float seen_rad;     // that the vector which is believed turned by
+    float current_rad;  // that the current turned by
     float flux_rad_s;
+    float flux_squared;
   };
   struct Speed {
     float mean_rad_s;
@@ -233,10 +234,8 @@ class FusedObserver {
   };
   void renew_length(float tick_s) noexcept;
   [[nodiscard]] Rotation rotation(const FluxTorque::Window& window) noexcept;
-  [[nodiscard]] bool flux_agrees(float flux_squared, float flux_rad, float expected_rad,
-                                 SpaceVector current_a) const noexcept;
-  void track_frequency(const Rotation& rotation, SpaceVector current_before_a) noexcept;
-  [[nodiscard]] bool locks(SpaceVector current_before_a) noexcept;
+  void track_frequency(const Rotation& rotation) noexcept;
+  [[nodiscard]] bool locks(float current_rad) noexcept;
   [[nodiscard]] Speed take_speed(const Rotation& rotation, float torque_nm) noexcept;
   [[nodiscard]] Torque corrected(const FluxTorque::Window& window) const noexcept;
   [[nodiscard]] LoadTorqueFilter::Output filter(const Torque& torque, const Speed& speed,

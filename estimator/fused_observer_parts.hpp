@@ -29,38 +29,32 @@ inline constexpr float kTareFollow_ratio = 0.02F;  // of what the tare belongs t
          kTwoPi * static_cast<float>(static_cast<int>(turns + (turns < 0.0F ? -0.5F : 0.5F)));
 }
 
-// Until the offsets are taken out they turn the flux angle far more than the current's. Of the
-// current only its tangent is asked for, which serves for less than half a radian.
-[[gnu::always_inline]] inline bool FusedObserver::flux_agrees(
-    float flux_squared, float flux_rad, float expected_rad, SpaceVector current_a) const noexcept {
-  constexpr float kFlux_rad_s = 20.0F;
-  constexpr float kCurrent_rad_s = 60.0F;
-  const float size = magnitude(expected_rad);
-  const float h = length_.tick_s;
-  if (!(flux_squared > settings_.least_flux_squared)) return false;
-  if (!(magnitude(flux_rad - expected_rad) < 0.3F * size + kFlux_rad_s * h)) return false;
-  const float along = dot(current_a, tick_.current_a);
-  const float across = cross(current_a, tick_.current_a);
-  return magnitude(across - expected_rad * along) < (0.5F * size + kCurrent_rad_s * h) * along;
-}
-
 [[gnu::always_inline]] inline auto FusedObserver::rotation(
     const FluxTorque::Window& window) noexcept -> Rotation {
+  constexpr float kFlux_rad_s = 20.0F;
+  constexpr float kCurrent_rad_s = 60.0F;
   const float l = settings_.leakage_inductance_h;
+  const float h = length_.tick_s;
   const SpaceVector i = window.current_a;
   const SpaceVector rotor{window.flux_v_s.alpha - l * i.alpha, window.flux_v_s.beta - l * i.beta};
-  const float expected = tick_.frequency_rad_s * length_.tick_s;
+  const float expected = tick_.frequency_rad_s * h;
+  const float size = magnitude(expected);
   const float flux_squared = dot(rotor, rotor);
   const float flux_rad = rotated(rotor, tick_.rotor_flux_v_s, expected);  // (E100)
-  const bool by_flux = tick_.calibrated != 0 && flux_agrees(flux_squared, flux_rad, expected, i);
+  const float current_rad = rotated(i, tick_.current_a, expected);
+  // Until the offsets are taken out they turn the flux angle far more than the current's.
+  const bool by_flux = tick_.calibrated != 0 && flux_squared > settings_.least_flux_squared &&
+                       magnitude(flux_rad - expected) < 0.3F * size + kFlux_rad_s * h &&
+                       magnitude(current_rad - expected) < 0.5F * size + kCurrent_rad_s * h;
   tick_.rotor_flux_v_s = rotor;
-  return {.seen_rad = by_flux ? flux_rad : rotated(i, tick_.current_a, expected),
-          .flux_squared = flux_squared,
-          .flux_rad_s = flux_rad * length_.ticks_per_s};
+  tick_.current_a = i;
+  return {.seen_rad = by_flux ? flux_rad : current_rad,
+          .current_rad = current_rad,
+          .flux_rad_s = flux_rad * length_.ticks_per_s,
+          .flux_squared = flux_squared};
 }
 
-[[gnu::always_inline]] inline void FusedObserver::track_frequency(
-    const Rotation& r, SpaceVector current_before_a) noexcept {
+[[gnu::always_inline]] inline void FusedObserver::track_frequency(const Rotation& r) noexcept {
   constexpr float kLowestFrequency_rad_s = kTwoPi * 3.0F;
   const float h = length_.tick_s;
   const float seen = r.seen_rad * length_.ticks_per_s;
@@ -70,7 +64,7 @@ inline constexpr float kTareFollow_ratio = 0.02F;  // of what the tare belongs t
   tick_.acceleration_rad_s2 += length_.acceleration_1_s2 * off;
   flux_.set_frequency(frequency);
   if (magnitude(frequency) > kLowestFrequency_rad_s &&
-      (tick_.locked_s > 0.0F || locks(current_before_a))) {
+      (tick_.locked_s > 0.0F || locks(r.current_rad))) {
     tick_.locked_s += h;
   } else {
     tick_.locked_s = 0.0F;

@@ -41,8 +41,6 @@ class PowerScale {
     float gain = 1.0F;
     float variance = 0.0F;
     std::uint32_t started = 0;
-    float time_s = 0.0F;  // since the last comparison
-    std::uint32_t ticks = 0;
   };
 
   [[nodiscard]] static constexpr std::expected<PowerScale, ConfigError> make(
@@ -51,8 +49,7 @@ class PowerScale {
     return PowerScale{config};
   }
 
-  // power_w: mean input power of the tick; meter_w: the reading at its end. The two are compared
-  // with every eighth tick: readings within 0.1 s are one anyway.
+  // power_w: mean input power of the tick; meter_w: the reading at its end.
   constexpr void step(float power_w, float meter_w, float duration_s) noexcept {
     if (state_.started == 0) [[unlikely]] {
       state_.lagged_w = meter_w;
@@ -60,11 +57,7 @@ class PowerScale {
     }
     const float share = duration_s < config_.lag_s ? duration_s * per_lag_1_s_ : 1.0F;
     state_.lagged_w += share * (power_w - state_.lagged_w);
-    state_.time_s += duration_s;
-    if ((++state_.ticks & (kTicks - 1)) != 0) [[likely]]
-      return;
-    compare(power_w, meter_w, state_.time_s);
-    state_.time_s = 0.0F;
+    compare(power_w, meter_w, duration_s);
   }
 
   // Without what the meter's own uncertainty explains: a check, not a second source.
@@ -77,7 +70,6 @@ class PowerScale {
   }
 
  private:
-  static constexpr std::uint32_t kTicks = 8;
   static constexpr float kExcused_sigmas = 0.4F;
   static constexpr float kSmallestPower_ratio = 0.2F;
   static constexpr float kLagError_ratio = 0.1F;
@@ -88,14 +80,14 @@ class PowerScale {
     state_.variance = config.gain_sigma_ratio * config.gain_sigma_ratio;
   }
 
-  [[gnu::noinline]] constexpr void compare(float power_w, float meter_w, float time_s) noexcept {
+  [[gnu::noinline]] constexpr void compare(float power_w, float meter_w, float duration_s) noexcept {
     if (!(state_.lagged_w > kSmallestPower_ratio * config_.rated_power_w)) return;
     const float off = meter_w / state_.lagged_w - 1.0F;
     if (!(off < config_.implausible_ratio && off > -config_.implausible_ratio)) return;
     // While the power still moves, an error of the lag shows as an error of the scale.
     const float from_lag = kLagError_ratio * (power_w - state_.lagged_w) / state_.lagged_w;
     const float least = config_.meter_sigma_ratio * config_.meter_sigma_ratio;
-    const float noise = (least + from_lag * from_lag) * kCorrelation_s / time_s;
+    const float noise = (least + from_lag * from_lag) * kCorrelation_s / duration_s;
     const float gain = state_.variance / (state_.variance + noise);
     state_.gain += gain * (1.0F + off - state_.gain);
     state_.variance *= 1.0F - gain;
