@@ -80,7 +80,8 @@ class PowerScale {
     state_.variance = config.gain_sigma_ratio * config.gain_sigma_ratio;
   }
 
-  [[gnu::noinline]] constexpr void compare(float power_w, float meter_w, float duration_s) noexcept {
+  [[gnu::noinline]] constexpr void compare(float power_w, float meter_w,
+                                           float duration_s) noexcept {
     if (!(state_.lagged_w > kSmallestPower_ratio * config_.rated_power_w)) return;
     const float off = meter_w / state_.lagged_w - 1.0F;
     if (!(off < config_.implausible_ratio && off > -config_.implausible_ratio)) return;

@@ -64,10 +64,8 @@ auto Board::receive(const hal::can::Frame& frame, std::int64_t now_ns) noexcept
 // What the bus and the board know of the samples, into each of them.
 void Board::complete(std::span<hal::Sample> samples, std::int64_t now_ns) noexcept {
   note_rate(static_cast<std::uint32_t>(samples.size()), now_ns);
-  for (hal::Sample& sample : samples) {
-    add_third_phase(sample);
-    note_turning(sample);
-  }
+  for (hal::Sample& sample : samples) add_third_phase(sample);
+  note_turning(samples.back());
   link_.add_to(samples);
 }
 
@@ -113,7 +111,7 @@ void Board::note_wear(const LoopOutput& output) noexcept {
 }
 
 // Tapping turns the spindle back: the force law does not hold for it. Until the board is armed, any
-// way is right.
+// way is right. The last sample of a block speaks for it.
 void Board::note_turning(const hal::Sample& sample) noexcept {
   const bool armed = supervision_.state >= SupervisorState::kMonitor;
   if (!armed) {

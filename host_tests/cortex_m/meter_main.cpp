@@ -1,6 +1,7 @@
 // The image that counts: instructions of every block, over the cut of a sample stream and over a
 // scripted cut for the controllers. A line each: name, mean, and most of any call.
 //   meter STREAM     a motor's signals at 5 kHz (toolchain/cortex_m/count.sh makes it)
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <string_view>
 
 #include "firmware/configuration.hpp"
+#include "firmware/configuration_board.hpp"
 #include "firmware/configuration_supervisor.hpp"
 #include "hal/cortex_m/console.hpp"
 #include "hal/cortex_m/meter.hpp"
@@ -215,6 +217,43 @@ bool count_loop(Meter& meter, std::string_view stream, const LoopNames& names) {
   return read;
 }
 
+// A millisecond of the board as the image runs it, but for converter and pins: five samples as they
+// lie in a half of the buffer, the loop, the supervisor, the frames. It estimates and is not armed.
+bool count_board(Meter& meter, std::string_view stream) {
+  static constinit Place<firmware::Board> place{};
+  firmware::Machine chosen = machine;
+  chosen.link_required = false;
+  const auto config = firmware::board_config(chosen, {.node = 1,
+                                                      .samples_by_can = false,
+                                                      .voltage_full_scale_v = 400.0F,
+                                                      .current_full_scale_a = 100.0F});
+  if (!config.check()) return false;
+  auto& board = place.make(firmware::Board::make_checked(config));
+  firmware::BoardHealth health{};
+  health.self_test_done = health.self_test_passed = health.ports_open = true;
+  Counts counts;
+  std::uint32_t rows = 0;
+  const auto sink = [&rows](const firmware::LoopOutput&) { ++rows; };
+  std::int64_t now_ns = 0;
+  const auto start = [&](const hal::Sample& sample) {
+    hal::Sample first = sample;
+    board.samples({&first, 1}, now_ns, sink);
+  };
+  const bool read =
+      over_stream(stream, start, [&](std::span<const hal::Sample> block, bool counted) {
+        now_ns += 1'000'000;
+        std::array<hal::Sample, kSamplesPerTick> half{};
+        std::ranges::copy(block, half.begin());
+        const std::uint32_t used = meter.count([&] {
+          board.samples(half, now_ns, sink);
+          if (const auto output = board.tick(now_ns, health); output.frame) board.sent();
+        });
+        if (counted) counts.add(used);
+      });
+  counts.show("board_millisecond");
+  return read && rows == (kRunIn + kCounted) / kSamplesPerTick;
+}
+
 template <class Body>
 void count_script(Meter& meter, Body& body, std::string_view name) {
   Counts counts;
@@ -304,6 +343,7 @@ int count_all() {
   bool sound = count_samples(meter, stream, *config);
   sound = count_control_tick(meter, stream) && sound;
   for (const LoopNames& names : kLoops) sound = count_loop(meter, stream, names) && sound;
+  sound = count_board(meter, stream) && sound;
   count_controllers(meter, config->controller);
   return sound ? 0 : 1;
 }
