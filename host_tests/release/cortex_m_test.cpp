@@ -56,6 +56,20 @@ TEST(CortexM, GivesTheBitsOfTheHost) {
   EXPECT_EQ(compared.exit_status, 0) << compared.output;
 }
 
+// The counts by kind are taken by another way than the meter's timer: they have to add up to it.
+TEST(CortexM, FindsTheSameCountByKindAsByTimer) {
+  if (const auto what = missing(); !what.empty()) GTEST_SKIP() << what;
+  const auto mixed = run_command("CUTFORCE_PROGRAM=" + quoted(CUTFORCE_PROGRAM) + " python3 " +
+                                 quoted(kTools + "mix.py") + " predictive 2>&1");
+  ASSERT_EQ(mixed.exit_status, 0) << mixed.output;
+  const auto budget = run_command("sed -n 's/^predictive //p' " +
+                                  quoted(kRoot + "/host_tests/cortex_m/budget.txt"));
+  const double by_kind = std::stod(mixed.output.substr(mixed.output.find(": ") + 2));
+  EXPECT_NEAR(by_kind, std::stod(budget.output), 0.02 * by_kind) << mixed.output;
+  for (const char* const kind : {"float + - x", "load", "store", "float comparison"})
+    EXPECT_NE(mixed.output.find(kind), std::string::npos) << mixed.output;
+}
+
 TEST(CortexM, RefusesAStreamThatIsNotThereOrAnothers) {
   if (const auto what = missing(); !what.empty()) GTEST_SKIP() << what;
   const ScratchFolder folder;

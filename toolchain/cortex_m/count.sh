@@ -21,12 +21,11 @@ done
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-echo "# $(arm-none-eabi-g++ --version | head -n 1), -O2, $preset, $machine: name and number"
+echo "# $(arm-none-eabi-g++ --version | head -n 1), -O2 and -Os by source, $preset, $machine: name and number"
 echo "# bytes"
 toolchain/cortex_m/size.py "$images/cutforce_image.elf" --brief
-# Start-up makes the blocks; then nothing but the cycle runs.
 toolchain/cortex_m/stack.py "build/$preset" "$images/cutforce_image.elf" |
-  awk '$1 == "worst" { print "stack_start_up", $2 }
+  awk '$1 == "worst" { print "stack_worst", $2 }
        $1 ~ /run_board$/ { print "stack_cycle", $2 }
        $1 ~ /ControlLoop::step$/ { print "stack_loop_step", $2 }'
 echo "# instructions a call: mean, and most"
