@@ -85,6 +85,29 @@ TEST(Board, GoesOnByItsClockWhenNothingComes) {
   EXPECT_GE(ticks, 20);
 }
 
+// A stall is not made up for step by step, but it is seen: the link is lost at the next tick, and
+// the clock goes on from there in its steps.
+TEST(Board, LosesTheLinkAtTheFirstTickAfterAStall) {
+  Running running;
+  running.run_to(6.0);
+  ASSERT_EQ(running.state(), SupervisorState::kControl);
+  const std::uint8_t before_pct = running.board.supervision().override_pct;
+  running.together.clock_ns += 10'000'000'000;
+  BoardHealth health = well();
+  health.missed_ticks = 9999;
+  static_cast<void>(running.board.tick(running.together.clock_ns, health));
+  EXPECT_GE(running.state(), SupervisorState::kLinkLost);
+  EXPECT_LE(running.board.supervision().override_pct, before_pct);
+  const SupervisorState after = running.state();
+  std::uint8_t last_pct = running.board.supervision().override_pct;
+  for (int k = 0; k < 5000; ++k) {
+    static_cast<void>(running.board.tick(running.together.clock_ns += kTick_ns, well()));
+    ASSERT_GE(running.state(), after);
+    ASSERT_LE(running.board.supervision().override_pct, last_pct);
+    last_pct = running.board.supervision().override_pct;
+  }
+}
+
 TEST(Board, StopsAtOnceWhenTheBusGoesOff) {
   for (const BusState state : {BusState::kOff, BusState::kDown}) {
     Running running;

@@ -212,11 +212,13 @@ TEST(LoadTorqueFilter, KeepsToTheRecursionThatRunsWithEveryTickWhereTheNoiseStep
     const auto input = input_of(load, speed, 0.4);
     const auto output = filter.step(input, noise);
     reference.step(input, noise);
+    // In parts of what the estimate claims to know: settled, gains of up to four ticks ago make no
+    // difference to speak of; while they follow a step of the noise, less than half.
     const bool stepped = k % 500 < 200 && k > 500;
-    ASSERT_NEAR(output.load_torque_nm, reference.torque(), (stepped ? 4e-3 : 2.5e-3) * kRated) << k;
-    ASSERT_NEAR(std::sqrt(output.variance_nm2), std::sqrt(reference.variance()),
-                (stepped ? 4e-3 : 2.5e-3) * kRated)
-        << k;
+    const double known_nm = std::sqrt(reference.variance());
+    const double most_nm = (stepped ? 0.5 : 0.05) * known_nm;
+    ASSERT_NEAR(output.load_torque_nm, reference.torque(), most_nm) << k;
+    ASSERT_NEAR(std::sqrt(output.variance_nm2), known_nm, most_nm) << k;
   }
 }
 

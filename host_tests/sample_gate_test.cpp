@@ -15,56 +15,14 @@
 #include <tuple>
 #include <vector>
 
-#if __has_include("support/allocation_count.hpp")
 #include "support/allocation_count.hpp"
-#define CUTFORCE_COUNTS_ALLOCATIONS
-#endif
+#include "support/spoiled_samples.hpp"
 
-namespace cutforce {
+namespace cutforce::host_tests {
 namespace {
 
 using estimator::Fault;
-using estimator::SampleGate;
 using Verdict = SampleGate::Verdict;
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInf = std::numeric_limits<float>::infinity();
-constexpr std::int64_t kMs = 1'000'000;
-
-constexpr SampleGate::Config kGate{.sample_period_s = 1e-3F,
-                                   .voltage_limit_v = 800.0F,
-                                   .current_limit_a = 30.0F,
-                                   .speed_limit_rad_s = 1000.0F,
-                                   .power_limit_w = 20000.0F,
-                                   .gap_limit_s = 0.1F,
-                                   .bridge_limit = 2,
-                                   .clock_limit = 50};
-static_assert(kGate.check());
-
-SampleGate::Input good(std::int64_t time_ns, float level = 1.0F) {
-  return {.time_ns = time_ns,
-          .values = {.voltage_v = {300.0F * level, -100.0F, -200.0F},
-                     .current_a = {5.0F * level, -2.0F, -3.0F},
-                     .speed_rad_s = 157.0F,
-                     .power_w = 1000.0F},
-          .present = SampleGate::kSpeed | SampleGate::kPower};
-}
-
-std::array<float, 8> flat(const SampleGate::Values& v) {
-  return {v.voltage_v[0], v.voltage_v[1], v.voltage_v[2], v.current_a[0],
-          v.current_a[1], v.current_a[2], v.speed_rad_s,  v.power_w};
-}
-
-void set(SampleGate::Values& v, std::size_t k, float x) {
-  if (k < 3)
-    v.voltage_v[k] = x;
-  else if (k < 6)
-    v.current_a[k - 3] = x;
-  else if (k == 6)
-    v.speed_rad_s = x;
-  else
-    v.power_w = x;
-}
 
 // What the gate says and what it lets through.
 struct Step {
@@ -241,50 +199,6 @@ TEST(SampleGate, RefusesWhatCannotBeALimit) {
   EXPECT_EQ(error([](auto& c) { c.clock_limit = 2'000'000; }), Error::kClockLimit);
 }
 
-// A source of samples that does everything wrong that a source can.
-class Vandal {
- public:
-  explicit Vandal(unsigned seed) : random_(seed) {}
-
-  SampleGate::Input next() {
-    SampleGate::Input in = good(time_ns_, unit());
-    const double dice = uniform_(random_);
-    if (dice < 0.80)
-      time_ns_ += kMs;
-    else if (dice < 0.90)
-      time_ns_ += static_cast<std::int64_t>(uniform_(random_) * 3e6);
-    else if (dice < 0.97)
-      time_ns_ += static_cast<std::int64_t>(uniform_(random_) * 20e6);
-    else if (dice < 0.98)
-      time_ns_ += static_cast<std::int64_t>(uniform_(random_) * 10e9);
-    in.time_ns = time_ns_;
-    in.present = static_cast<std::uint32_t>(random_() % 4);
-    while (uniform_(random_) < 0.3) set(in.values, random_() % 8, rubbish());
-    return in;
-  }
-
-  SampleGate::Input misplaced(const SampleGate::Input& last) {
-    SampleGate::Input in = next_values(last);
-    if (random_() % 2 == 0) in.time_ns -= static_cast<std::int64_t>(random_() % 1000000);
-    return in;
-  }
-
-  bool sometimes(double share) { return uniform_(random_) < share; }
-
- private:
-  SampleGate::Input next_values(const SampleGate::Input& last) {
-    SampleGate::Input in = last;
-    set(in.values, random_() % 8, rubbish());
-    return in;
-  }
-  float unit() { return static_cast<float>(uniform_(random_)); }
-  float rubbish() { return std::bit_cast<float>(static_cast<std::uint32_t>(random_())); }
-
-  std::mt19937 random_;
-  std::uniform_real_distribution<double> uniform_{0.0, 1.0};
-  std::int64_t time_ns_ = 0;
-};
-
 TEST(SampleGate, NeverLetsAnythingThroughThatIsNotFiniteAndInRange) {
   int accepted = 0;
   int bridged = 0;
@@ -337,123 +251,18 @@ TEST(SampleGate, GivesTheSameBitsWithAMillionMisplacedSamplesAsWithout) {
   }
 }
 
-struct Row {
-  std::int64_t time_ns;
-  std::array<float, 3> voltage_v;
-  std::array<float, 3> current_a;
-  float speed_rad_s;
-  float power_meter_w;
-  std::uint32_t present;  // with the gate's bits from bit 6 on
-};
-
-Row row_of(const SampleGate::Input& in) {
-  return {.time_ns = in.time_ns,
-          .voltage_v = in.values.voltage_v,
-          .current_a = in.values.current_a,
-          .speed_rad_s = in.values.speed_rad_s,
-          .power_meter_w = in.values.power_w,
-          .present = in.present << 6U};
-}
-
-// Whether one comparison clears three channels (E9): two of them at 0.8 of their range are usable,
-// but have to be looked at one by one.
-bool cleared_at_once(const SampleGate::Values& v) {
-  const auto below = [](const std::array<float, 3>& x, float limit) {
-    return std::hypot(x[0], x[1], x[2]) < 0.9979F * limit;
-  };
-  return below(v.voltage_v, kGate.voltage_limit_v) && below(v.current_a, kGate.current_limit_a);
-}
-
-// A run is worth nothing if it lets one sample pass that step() would bridge, drop or report, and
-// little if it stops at one that step() accepts without a word.
-TEST(SampleGate, AcceptsInARunWhatItAcceptsOneByOne) {
-  Vandal vandal(10);
-  std::mt19937 random(11);
-  auto singly = SampleGate::make(kGate).value();
-  auto in_runs = SampleGate::make(kGate).value();
-  std::size_t accepted_in_runs = 0;
-  for (int block = 0; block < 100'000; ++block) {
-    std::vector<SampleGate::Input> inputs;
-    std::generate_n(std::back_inserter(inputs), 1 + random() % 9, [&] { return vandal.next(); });
-    std::vector<Row> rows;
-    std::ranges::transform(inputs, std::back_inserter(rows), row_of);
-    for (std::size_t at = 0; at < rows.size();) {
-      std::size_t taken = 0;
-      in_runs.accept_run<6>(std::span<const Row>(rows).subspan(at), [&](const Row& row) {
-        ASSERT_EQ(row.time_ns, rows[at + taken].time_ns);
-        ++taken;
-      });
-      for (std::size_t k = at; k < at + taken; ++k) {
-        const auto out = singly.step(inputs[k]);
-        ASSERT_EQ(out.verdict, Verdict::kAccept);
-        ASSERT_TRUE(out.faults.empty());
-        ASSERT_EQ(out.elapsed_periods, 1.0F);
-        ASSERT_EQ(out.at_end_channels, 0U);
-        ASSERT_EQ(out.present, inputs[k].present);
-      }
-      accepted_in_runs += taken;
-      at += taken;
-      if (at == rows.size()) break;
-      const bool like_the_run = taken == 0 || inputs[at].present == inputs[at - 1].present;
-      const bool could_go_on = in_runs.state().unusual == 0 && like_the_run &&
-                               inputs[at].present == (SampleGate::kSpeed | SampleGate::kPower) &&
-                               cleared_at_once(inputs[at].values);
-      const auto a = singly.step(inputs[at]);
-      const bool usual = a.verdict == Verdict::kAccept && a.faults.empty() &&
-                         a.elapsed_periods == 1.0F && a.at_end_channels == 0;
-      ASSERT_FALSE(could_go_on && usual) << block;
-      const auto b = in_runs.step(inputs[at]);
-      ASSERT_EQ(a.verdict, b.verdict);
-      ++at;
-    }
-    ASSERT_EQ(std::memcmp(&singly.state(), &in_runs.state(), sizeof(SampleGate::State)), 0)
-        << block;
-  }
-  EXPECT_GT(accepted_in_runs, 50'000);
-}
-
-TEST(SampleGate, StopsARunAtTheFirstSampleThatIsNotUsual) {
-  constexpr std::size_t kRows = 5;
-  for (std::size_t bad = 0; bad < kRows; ++bad) {
-    for (int way = 0; way < 6; ++way) {
-      auto gate = SampleGate::make(kGate).value();
-      std::ignore = gate.step(good(0));
-      std::vector<Row> rows;
-      for (std::size_t k = 0; k < kRows; ++k)
-        rows.push_back(row_of(good(static_cast<std::int64_t>(k + 1) * kMs)));
-      Row& row = rows[bad];
-      if (way == 0) row.voltage_v[2] = -kNan;
-      if (way == 1) row.current_a[1] = 29.99F;  // at its end
-      if (way == 2) row.time_ns += std::int64_t{1} << 32U;
-      if (way == 3) row.time_ns -= kMs / 50;
-      if (way == 4) row.power_meter_w = -20001.0F;
-      if (way == 5) row.present &= ~(SampleGate::kSpeed << 6U);
-      std::size_t taken = 0;
-      gate.accept_run<6>(std::span<const Row>(rows), [&](const Row&) { ++taken; });
-      // What a whole run lacks is held against none of it, unless a value is there all the same.
-      const std::size_t expected = way == 5 && bad == 0 ? 0 : bad;
-      ASSERT_EQ(taken, expected) << "row " << bad << ", way " << way;
-      ASSERT_EQ(gate.state().last_time_ns, static_cast<std::int64_t>(expected) * kMs);
-    }
-  }
-}
-
 TEST(SampleGate, ContinuesBitExactlyFromASnapshotWithoutAllocating) {
   Vandal vandal(9);
   auto original = SampleGate::make(kGate).value();
   auto resumed = SampleGate::make(kGate).value();
-#ifdef CUTFORCE_COUNTS_ALLOCATIONS
-  const auto allocations = host_tests::allocation_count();
-#endif
+  const auto allocations = allocation_count();
   for (int n = 0; n < 20000; ++n) {
     resumed.restore(original.state());
     const auto in = vandal.next();
     ASSERT_TRUE(bits_equal(step(original, in), step(resumed, in))) << n;
   }
-#ifdef CUTFORCE_COUNTS_ALLOCATIONS
-  EXPECT_EQ(host_tests::allocation_count(), allocations);
-#endif
+  EXPECT_EQ(allocation_count(), allocations);
 }
 
 }  // namespace
-}  // namespace cutforce
+}  // namespace cutforce::host_tests

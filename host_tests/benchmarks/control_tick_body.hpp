@@ -15,6 +15,7 @@
 #include "hal/can/messages.hpp"
 #include "hal/port.hpp"
 #include "host_tests/benchmarks/target_bodies.hpp"
+#include "host_tests/support/sound_input.hpp"
 
 namespace cutforce::benchmarks {
 
@@ -118,30 +119,7 @@ class SynthesizedTick {
     supervision_ = supervisor_.step(health_);
   }
 
-  control::Supervisor::Input health_{.self_test_done = true,
-                                     .self_test_passed = true,
-                                     .checks_passed = true,
-                                     .checks_done = true,
-                                     .output_failed = false,
-                                     .foreign = false,
-                                     .stop = false,
-                                     .bus_down = false,
-                                     .inhibit = false,
-                                     .threading = false,
-                                     .signals_refused = false,
-                                     .reversed = false,
-                                     .arm = false,
-                                     .control = false,
-                                     .reset = false,
-                                     .spindle_at_speed = true,
-                                     .feeding = true,
-                                     .machine_state_new = true,
-                                     .sample_new = true,
-                                     .force_new = false,
-                                     .missed_ticks = 0,
-                                     .force_n = 0.0F,
-                                     .force_limit_n = 0.0F,
-                                     .override_pct = 100};
+  control::Supervisor::Input health_ = host_tests::sound_input();
   estimator::TorquePath::Output torque_{};
   estimator::CuttingForce::Output force_{};
   hal::Command command_{};

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "control/supervisor.hpp"
+#include "support/sound_input.hpp"
 
 namespace cutforce::host_tests {
 
@@ -25,31 +26,28 @@ inline constexpr control::Supervisor::Config kSupervised{
 };
 static_assert(kSupervised.check());
 
-// Spindle at speed, in the cut, the controller at 80 %; nobody has pressed anything.
-[[nodiscard]] constexpr control::Supervisor::Input sound_input() {
-  return {.self_test_done = true,
-          .self_test_passed = true,
-          .checks_passed = true,
-          .output_failed = false,
-          .foreign = false,
-          .stop = false,
-          .bus_down = false,
-          .inhibit = false,
-          .threading = false,
-          .signals_refused = false,
-          .reversed = false,
-          .arm = false,
-          .control = false,
-          .reset = false,
-          .spindle_at_speed = true,
-          .feeding = true,
-          .machine_state_new = true,
-          .sample_new = true,
-          .force_new = true,
-          .missed_ticks = 0,
-          .force_n = 400.0F,
-          .force_limit_n = 1000.0F,
-          .override_pct = 80};
+// How much the board may do: what leads up needs a person.
+[[nodiscard]] constexpr int authority(control::SupervisorState state) {
+  using S = control::SupervisorState;
+  switch (state) {
+    case S::kControl:
+      return 3;
+    case S::kHold:
+      return 3;
+    case S::kMonitor:
+      return 2;
+    case S::kReady:
+      return 1;
+    case S::kBoot:
+    case S::kSelfTest:
+    case S::kCheck:
+    case S::kLinkLost:
+    case S::kProtect:
+    case S::kSafe:
+    case S::kDead:
+      return 0;
+  }
+  return 0;
 }
 
 struct SupervisorBench {
