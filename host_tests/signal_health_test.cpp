@@ -11,169 +11,12 @@
 
 #include "estimator/front_end.hpp"
 #include "estimator/sample_gate.hpp"
+#include "support/allocation_count.hpp"
+#include "support/health_rig.hpp"
 #include "support/motor_signals.hpp"
 
-#if __has_include("support/allocation_count.hpp")
-#include "support/allocation_count.hpp"
-#define CUTFORCE_COUNTS_ALLOCATIONS
-#endif
-
-namespace cutforce {
+namespace cutforce::host_tests {
 namespace {
-
-using estimator::CurrentChannels;
-using estimator::Fault;
-using estimator::FaultSet;
-using estimator::FrontEnd;
-using estimator::SampleGate;
-using estimator::SignalHealth;
-using estimator::VoltageChannels;
-using host_tests::MotorCondition;
-using host_tests::MotorSignals;
-using host_tests::VoltageSampling;
-
-constexpr SignalHealth::Config kHealth{.sample_period_s = 2e-4F,
-                                       .tick_period_s = 1e-3F,
-                                       .voltage_channels = 3,
-                                       .current_channels = 3,
-                                       .voltage_range_v = 800.0F,
-                                       .current_range_a = 28.28F,
-                                       .voltage_floor_v = 8.0F,
-                                       .current_floor_a = 0.3F,
-                                       .minimum_frequency_rad_s = 18.85F,
-                                       .rated_frequency_rad_s = 314.0F,
-                                       .rated_flux_v_s = 1.0F,
-                                       .stator_resistance_ohm = 3.7F,
-                                       .hold_s = 0.05F};
-static_assert(kHealth.check());
-
-constexpr double kSpeeds[] = {300.0, 600.0, 1000.0, 1500.0, 2400.0};
-
-std::string names(FaultSet faults) {
-  std::string out;
-  for (std::size_t k = 0; k < estimator::kFaultCount; ++k)
-    if (faults.contains(static_cast<Fault>(k))) out += std::string(estimator::kFaultNames[k]) + " ";
-  return out;
-}
-
-// Motor, converter, front end and the block under test, with a way to spoil the channels:
-// [0..2] voltages, [3..5] currents, after the converter.
-class Rig {
- public:
-  using Channels = std::array<float, 6>;
-  std::function<void(Channels&)> spoil = [](Channels&) {};
-  std::function<void(MotorSignals::Sample&)> rewire = [](MotorSignals::Sample&) {};
-  MotorSignals motor;
-  double frequency_scale = 1.0;
-  SignalHealth::Config config = kHealth;
-
-  explicit Rig(const MotorCondition& condition) : motor(condition) {
-    config.sample_period_s = static_cast<float>(1.0 / motor.condition.sample_rate_hz);
-    per_tick_ = std::max(1, static_cast<int>(std::lround(motor.condition.sample_rate_hz * 1e-3)));
-  }
-
-  SignalHealth::Output tick() {
-    if (!made_) {
-      health_ = SignalHealth::make(config).value();
-      gate_ = SampleGate::make({.sample_period_s = config.sample_period_s,
-                                .voltage_limit_v = config.voltage_range_v,
-                                .current_limit_a = config.current_range_a,
-                                .speed_limit_rad_s = 1e3F,
-                                .power_limit_w = 1e5F,
-                                .gap_limit_s = 0.1F,
-                                .bridge_limit = 2,
-                                .clock_limit = 0})
-                  .value();
-      made_ = true;
-    }
-    MotorSignals::Sample s{};
-    for (int n = 0; n < per_tick_; ++n) {
-      s = motor.next();
-      rewire(s);
-      Channels c{};
-      for (std::size_t k = 0; k < 3; ++k) {
-        c[k] = static_cast<float>(motor.read(s.v[k], true));
-        c[3 + k] = static_cast<float>(motor.read(s.i[k], false));
-      }
-      spoil(c);
-      time_ns_ += std::llround(1e9 / motor.condition.sample_rate_hz);
-      const auto passed = gate_.step({time_ns_, {{c[0], c[1], c[2]}, {c[3], c[4], c[5]}, 0, 0}, 0});
-      const auto& v = gate_.values().voltage_v;
-      const auto& i = gate_.values().current_a;
-      const auto out = front_end_.step({v, i});
-      health_.observe({v, i, out.motor, out.current_residual_a, passed.elapsed_periods,
-                       passed.at_end_channels});
-    }
-    frequency_ = s.frequency_rad_s;
-    return last_ = health_.step({static_cast<float>(frequency_scale * frequency_), 0.0F, false});
-  }
-
-  FaultSet run(double seconds) {
-    FaultSet seen;
-    for (int n = 0; n < static_cast<int>(seconds * 1e3); ++n) seen = seen | tick().faults;
-    return seen;
-  }
-
-  // Milliseconds until the fault is named, or -1.
-  int until(Fault fault, double seconds) {
-    for (int n = 1; n <= static_cast<int>(seconds * 1e3); ++n)
-      if (tick().faults.contains(fault)) return n;
-    return -1;
-  }
-
-  [[nodiscard]] const SignalHealth::Output& last() const { return last_; }
-  SignalHealth& block() { return health_; }
-
- private:
-  FrontEnd front_end_ = FrontEnd::make({VoltageChannels::kLineToNeutral,
-                                        CurrentChannels::kThree,
-                                        {{1, 1, 1}, {0, 0, 0}, {1, 1, 1}, {0, 0, 0}}})
-                            .value();
-  SignalHealth health_ = SignalHealth::make(kHealth).value();
-  SampleGate gate_ = SampleGate::make({2e-4F, 800, 30, 1e3F, 1e5F, 0.1F, 2, 0}).value();
-  std::int64_t time_ns_ = 0;
-  SignalHealth::Output last_{};
-  bool made_ = false;
-  int per_tick_ = 5;
-  double frequency_ = 0.0;
-};
-
-// What a window of n steps that misses a whole number of periods lets through, exactly.
-double leak(double step, int n) {
-  return std::fabs(std::sin(0.5 * step * n) / (n * std::sin(0.5 * step)));
-}
-
-TEST(PeriodPhasors, FindsTheFundamentalAndBothSequencesAndNoOffset) {
-  for (const double step : {0.01, 0.1, 0.3, -0.3, 0.9, 2.0, 7.0}) {
-    SCOPED_TRACE(step);
-    estimator::PeriodPhasors phasors;
-    double angle = 0.4;
-    int n = 0;
-    for (bool ended = false; !ended && n < 10000; ++n) {
-      angle += step;
-      const auto f = [](double x) { return static_cast<float>(x); };
-      ended = phasors.step(
-          {.channel = {f(3.0 * std::cos(angle) + 1.0), 0.0F, 5.0F, 0.0F, 0.0F, f(std::sin(angle))},
-           .motor = {.voltage_v = {f(10.0 * std::cos(angle)), f(10.0 * std::sin(angle))},
-                     .current_a = {f(3.0 * std::cos(angle)), f(std::sin(angle))}},
-           .current_residual_a = 0.0F,
-           .angle_rad = f(step)});
-    }
-    const auto out = phasors.result();
-    const double of_offset = 2.0 * leak(step, n);  // a phasor is twice the mean
-    const double of_twice = leak(2.0 * step, n);   // the fundamental against its mirror image
-    EXPECT_LT(of_offset, 0.3) << "or the tests of a period mean nothing";
-    EXPECT_NEAR(out.amplitude[0], 3.0, of_offset + 3.0 * of_twice + 1e-3);
-    EXPECT_NEAR(out.amplitude[2], 0.0, 5.0 * of_offset + 1e-3);
-    EXPECT_NEAR(out.amplitude[5], 1.0, of_twice + 1e-3);
-    EXPECT_NEAR(out.mean[2], 5.0, 1e-4);
-    EXPECT_NEAR(std::hypot(out.voltage_v.positive.alpha, out.voltage_v.positive.beta), 10.0, 1e-3);
-    EXPECT_NEAR(std::hypot(out.current_a.positive.alpha, out.current_a.positive.beta), 2.0,
-                of_twice + 1e-3);
-    EXPECT_NEAR(std::hypot(out.current_a.negative.alpha, out.current_a.negative.beta), 1.0,
-                2.0 * of_twice + 1e-3);
-  }
-}
 
 TEST(SignalHealth, FindsAChannelStuckAtAnyCodeWithinTwentyMilliseconds) {
   int found = 0;
@@ -236,66 +79,6 @@ TEST(SignalHealth, FindsAnOpenMotorPhase) {
     };
     EXPECT_GT(rig.until(Fault::kLostPhase, 0.04), 0);
     EXPECT_FALSE(rig.run(1.0).contains(Fault::kPhaseOrder)) << "one cause, one name";
-  }
-}
-
-// One kind of sensor wired with each permutation and each set of signs while the other is right.
-// Power and torque are those of the motor for the identity only. Seen together, the same
-// permutation and one common sign on both kinds is equivalent: it only turns or mirrors the frame.
-int count_passing(bool voltages, double rpm) {
-  constexpr std::array<std::array<std::size_t, 3>, 6> kOrders{
-      {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
-  int passing = 0;
-  for (std::size_t order = 0; order < 6; ++order) {
-    for (unsigned signs = 0; signs < 8; ++signs) {
-      Rig rig({.speed_rpm = rpm});
-      rig.rewire = [=](MotorSignals::Sample& s) {
-        auto& x = voltages ? s.v : s.i;
-        const auto right = x;
-        for (std::size_t k = 0; k < 3; ++k)
-          x[k] = (signs >> k & 1U) != 0 ? -right[kOrders[order][k]] : right[kOrders[order][k]];
-      };
-      FaultSet seen = rig.run(1.5);
-      rig.motor.condition.load = 0.7;
-      seen = seen | rig.run(1.5);
-      const bool right = order == 0 && signs == 0;
-      EXPECT_EQ(seen.contains(Fault::kPhaseOrder), !right)
-          << (voltages ? "voltages" : "currents") << " order " << order << " signs " << signs;
-      EXPECT_FALSE(seen.contains(Fault::kRawPwm)) << names(seen);
-      EXPECT_EQ(seen.empty(), right) << names(seen);
-      passing += seen.empty();
-    }
-  }
-  return passing;
-}
-
-TEST(SignalHealth, LetsExactlyTheRightOneOfFortyEightWiringsPass) {
-  for (const double rpm : {300.0, 1500.0, -1500.0}) {
-    const int currents = count_passing(false, rpm);
-    const int voltages = count_passing(true, rpm);
-    std::printf("wirings that pass at %.0f rpm: currents %d of 48, voltages %d of 48\n", rpm,
-                currents, voltages);
-    EXPECT_EQ(currents, 1);
-    EXPECT_EQ(voltages, 1);
-  }
-}
-
-TEST(SignalHealth, LetsAWiringPassThatOnlyTurnsOrMirrorsTheFrame) {
-  for (const bool mirrored : {false, true}) {
-    for (const double sign : {1.0, -1.0}) {
-      Rig rig({.load = 0.5});
-      rig.frequency_scale = mirrored ? -1.0 : 1.0;
-      rig.rewire = [=](MotorSignals::Sample& s) {
-        const auto v = s.v;
-        const auto i = s.i;
-        for (std::size_t k = 0; k < 3; ++k) {
-          const std::size_t from = mirrored ? (3 - k) % 3 : (k + 1) % 3;
-          s.v[k] = sign * v[from];
-          s.i[k] = sign * i[from];
-        }
-      };
-      EXPECT_TRUE(rig.run(3.0).empty()) << mirrored << sign;
-    }
   }
 }
 
@@ -500,9 +283,7 @@ TEST(SignalHealth, ContinuesBitExactlyFromASnapshotWithoutAllocating) {
   auto original = rig.block();
   auto resumed = SignalHealth::make(kHealth).value();
   MotorSignals motor{MotorCondition{}};
-#ifdef CUTFORCE_COUNTS_ALLOCATIONS
-  const auto allocations = host_tests::allocation_count();
-#endif
+  const auto allocations = allocation_count();
   for (int n = 0; n < 5000; ++n) {
     resumed.restore(original.state());
     for (int k = 0; k < 5; ++k) {
@@ -520,10 +301,8 @@ TEST(SignalHealth, ContinuesBitExactlyFromASnapshotWithoutAllocating) {
     ASSERT_EQ(std::memcmp(&original.state(), &resumed.state(), sizeof(SignalHealth::State)), 0)
         << n;
   }
-#ifdef CUTFORCE_COUNTS_ALLOCATIONS
-  EXPECT_EQ(host_tests::allocation_count(), allocations);
-#endif
+  EXPECT_EQ(allocation_count(), allocations);
 }
 
 }  // namespace
-}  // namespace cutforce
+}  // namespace cutforce::host_tests
