@@ -66,6 +66,8 @@ run_tests() {
     sed -n '/The following tests FAILED/,$p' "$results" | grep -v -e '(Skipped)$' -e '^Errors while'
     grep -A 4 -e ': Failure$' -e 'ERROR: AddressSanitizer' -e 'runtime error:' "$results" |
       head -n 60 || true
+    # What the tests in Python say: from the name to the exception.
+    sed -n '/^\(FAIL\|ERROR\): /,/^[A-Za-z.]*\(Error\|Exception\)\>/p' "$results" | head -n 60 || true
     ((failed > failed_before)) || failed=$((failed + 1))  # ctest says no, and names no test
   fi
 }
