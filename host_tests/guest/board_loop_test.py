@@ -21,28 +21,27 @@ STEP_M = 0.0015
 
 # Logging all frames of the acquisition node would cost as much as the loop itself.
 LOOP = f"""
-candump -L can0,081:7FF,181:7FF,7E0:7FF > /tmp/can.log & listening=$!
-candump -L -n 2500 can0 > /tmp/begin.log &
-( {board.SERVICE} ) > /share/service 2>&1 & service=$!
-candump -n 1 can1,181:7FF > /dev/null; cut -d ' ' -f 1 /proc/uptime > /share/first_status
+listen -L -n 2500 can0 > /left/begin.log
+listen -L can0,081:7FF,181:7FF,7E0:7FF > /left/can.log
+( {board.SERVICE} ) > /left/service 2>&1 & service=$!
+candump -n 1 can1,181:7FF > /dev/null; cut -d ' ' -f 1 /proc/uptime > /left/first_status
 cutforce cnc --can can1 --lathe /etc/bench_lathe.toml --control --abrupt \\
   --duration {DURATION_S} --json \\
-  --out /share/bench.csv > /share/bench.json 2> /dev/null || exit 3
+  --out /left/bench.csv > /left/bench.json 2> /dev/null || exit 3
 sleep 0.6  # without a CNC
 kill -TERM $service; wait $service || exit 4
-kill $listening; cp /tmp/can.log /tmp/begin.log /tmp/trace/* /share
-dd if=/dev/cutforce_gpio_log of=/share/gpio.log bs=1M count=1 2> /dev/null
+kill $listening
+dd if=/dev/cutforce_gpio_log of=/left/gpio.log bs=1M count=1 2> /dev/null
 """
 # Every type of frame from each controller to the other.
 TYPES = """
 for type in 081 101 181 201 281 301 381 401 701; do
-  cat /tmp/begin.log /tmp/can.log | grep -m 5 " $type#" | tail -n 3
-done > /share/types.log
+  cat /left/begin.log /left/can.log | grep -m 5 " $type#" | tail -n 3
+done > /left/types.log
 for way in "can0 can1" "can1 can0"; do
   set -- $way
-  candump -L -n $(wc -l < /share/types.log) $2 > /share/heard_$2.log & listening=$!
-  usleep 100000
-  canplayer -t -g 2 -I /share/types.log $1=can0
+  listen -L -n $(wc -l < /left/types.log) $2 > /left/heard_$2.log
+  canplayer -t -g 2 -I /left/types.log $1=can0
   wait $listening
 done
 """
@@ -56,7 +55,7 @@ def table(text):
 
 class TheLoop(unittest.TestCase):
     def test_holds_the_force_with_the_overrides_of_the_host_run(self):
-        traced = board.BOARD + '[trace]\nfolder = "/tmp/trace"\n'
+        traced = board.BOARD + '[trace]\nfolder = "/left"\n'
         guest, left = boot_board(LOOP + TYPES, text=traced)
         print(left["service"].decode())
         frames = can_log(left["can.log"])
@@ -160,7 +159,7 @@ speed = "in_voltage5"
 power_meter = "in_power"
 {"".join(f"{key} = {value}{chr(10)}" for key, value in WIRED.items())}
 [trace]
-folder = "/tmp/trace"
+folder = "/left"
 """
 RATE_HZ = 5000
 RECORDED_S = 5
@@ -178,13 +177,12 @@ COLUMNS = {
 SAMPLED = f"""
 echo {SCALE:.9f} > /sys/bus/iio/devices/iio:device0/in_voltage_scale
 echo {RATE_HZ} > /sys/bus/iio/devices/iio:device0/sampling_frequency
-cutforced /etc/cutforce/board.toml > /share/service 2>&1 & service=$!
+cutforced /etc/cutforce/board.toml > /left/service 2>&1 & service=$!
 candump -n 1 can1,181:7FF > /dev/null
 cutforce_feeder /etc/cutforce/scans {RATE_HZ // 1000} || exit 3
 sleep 0.1
 kill -TERM $service; wait $service || exit 4
-cat /sys/module/cutforce_bench/parameters/scans_lost > /share/lost
-cp /tmp/trace/* /share
+cat /sys/module/cutforce_bench/parameters/scans_lost > /left/lost
 """
 
 

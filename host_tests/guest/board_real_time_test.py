@@ -20,12 +20,12 @@ LOAD = """
 """
 # CNC and acquisition node are other machines: what is beside the service must not delay them.
 SCRIPT = f"""
-uname -v > /share/kernel
+uname -v > /left/kernel
 {LOAD}second=$!
 cutforce cnc --can can1 --lathe /etc/bench_lathe.toml --arm \\
   --duration {TICKS / 1000 + 60} > /dev/null 2>&1 &
 renice -n -20 -p $! > /dev/null
-cutforced /etc/cutforce/board.toml --ticks {TICKS + 2500} > /share/service 2>&1 || exit 3
+cutforced /etc/cutforce/board.toml --ticks {TICKS + 2500} > /left/service 2>&1 || exit 3
 """
 
 

@@ -20,15 +20,15 @@ HALF_PERIOD_S = 0.02  # of the alive line
 TICK_S = 0.001
 
 BEGIN = f"""
-candump -L can0,081:7FF,181:7FF,7E0:7FF > /tmp/can.log & listening=$!
+listen -L can0,081:7FF,181:7FF,7E0:7FF > /left/can.log
 mark() {{ gpioset cutforce-bench {board.MARKED}=$1; }}
-serve() {{ ( {board.SERVICE} ) >> /share/service 2>&1 & service=$!; }}
+serve() {{ ( {board.SERVICE} ) >> /left/service 2>&1 & service=$!; }}
 until_state() {{ timeout 5 candump -L can1,181:7FF | grep -m 1 -q "181#.\\{{9\\}}$1" || exit 5; }}
 kill_service() {{ mark 1; kill -9 $service; wait $service; sleep 0.3; mark 0; }}
 """
 END = """
-kill $listening; cp /tmp/can.log /share/can.log
-dd if=/dev/cutforce_gpio_log of=/share/gpio.log bs=8M count=1 2> /dev/null
+kill $listening
+dd if=/dev/cutforce_gpio_log of=/left/gpio.log bs=8M count=1 2> /dev/null
 """
 
 # Killed in control, in the cut. Then there are samples, and a CNC whose arm and control are high
@@ -37,7 +37,7 @@ KILLED = f"""
 {BEGIN}
 serve
 cutforce cnc --can can1 --lathe /etc/bench_lathe.toml --control --duration 4.5 --json \\
-  > /share/cnc.json 2> /dev/null & cnc=$!
+  > /left/cnc.json 2> /dev/null & cnc=$!
 sleep 4.2
 kill_service
 wait $cnc
@@ -56,7 +56,7 @@ kill $low
 canplayer -l i -I /etc/cutforce/high.log &
 until_state {MONITOR}
 sleep 0.1
-mark 1; kill -TERM $service; wait $service; echo $? > /share/status
+mark 1; kill -TERM $service; wait $service; echo $? > /left/status
 sleep 0.1
 {END}
 """
@@ -208,7 +208,7 @@ REFUSED = {
 }
 # The world holds all lines up: one that became an output would fall, and be in the log.
 REFUSALS = """
-candump -L can0,181:7FF can0,081:7FF > /tmp/can.log & listening=$!
+listen -L can0,181:7FF can0,081:7FF > /left/can.log
 ip link set can1 down
 printf '\\377\\377' > /dev/cutforce_gpio
 for case in /etc/cutforce/case_*; do
@@ -218,12 +218,12 @@ for case in /etc/cutforce/case_*; do
     until gpioinfo cutforce-bench | grep -q gpioset; do :; done
   fi
   echo $name
-  timeout 5 cutforced $case > /share/$name.text 2>&1; echo $? > /share/$name.status
+  timeout 5 cutforced $case > /left/$name.text 2>&1; echo $? > /left/$name.status
   [ $name = case_busy ] && kill $holder
 done
-kill $listening; cp /tmp/can.log /share
+kill $listening
 gpioset cutforce-bench 15=0
-dd if=/dev/cutforce_gpio_log of=/share/gpio.log bs=1M count=1 2> /dev/null
+dd if=/dev/cutforce_gpio_log of=/left/gpio.log bs=1M count=1 2> /dev/null
 """
 
 

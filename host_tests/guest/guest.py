@@ -9,7 +9,9 @@
 
 In the guest: busybox; /sbin/ip, can-utils, gpiod's tools; can0 and can1 (kvaser_pci) on one bus;
 vcan and slcan; two watchdogs; gpiochip0 (PL061, 8 lines); the bench module (bench_module/bench.h).
-Host and guest share a folder: guest.share here, /share there.
+Host and guest share a folder: guest.share here, /share there. While it waits for this machine's file
+system, a guest that counts instructions lets time fly: where time matters, what is to be read here
+is written to /left, which goes to guest.share when all is done.
 
 As a program: guest.py SCRIPT [PROGRAM...] boots, runs the script with the programs in /bin, and
 prints what it says; see --help.

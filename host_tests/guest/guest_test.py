@@ -75,10 +75,9 @@ class TheCanBus(unittest.TestCase):
         with Guest() as guest:
             can_up(guest)
             for here, there in (("can0", "can1"), ("can1", "can0")):
-                listening = guest.start(f"candump -L -n 2 {there} > /tmp/{there}")
-                guest.run(f"until [ $(grep -c . /proc/net/can/rcvlist_all) -gt 3 ]; do :; done")
+                guest.run(f"listen -L -n 2 {there} > /tmp/{there}")
                 guest.run(f"cansend {here} 123#DEADBEEF; cansend {here} 1FFFFFFF#01")
-                guest.run(f"wait {listening}")
+                guest.run("wait $listening")
                 heard = [line.split()[1:] for line in guest.run(f"cat /tmp/{there}")]
                 self.assertEqual(heard, [[there, "123#DEADBEEF"], [there, "1FFFFFFF#01"]])
 

@@ -87,14 +87,11 @@ class ServedBoard(Guest):
         """Plays a script of frames while candump listens (to `listen`, as candump names it); what
         it heard. `beside`: shell that starts with the first frame."""
         script.write(self.share / "script")
-        # While it waits for this machine's file system, a guest that counts instructions lets time
-        # fly: nothing on /share is read once time matters.
         self.run("cp /share/script /tmp/script")
         listen = listen or script.interface
-        listener = self.start(f"candump -D -L {listen} > /tmp/heard 2> /tmp/candump")
-        self.run(
-            f"sleep 0.05; ({beside}) & canplayer -I /tmp/script; sleep {after_s}; kill {listener}"
-        )
+        self.run(f"listen -D -L {listen} > /tmp/heard 2> /tmp/candump")
+        play = "canplayer -I /tmp/script"
+        self.run(f"sleep 0.05; ({beside}) & {play}; sleep {after_s}; kill $listening")
         return self.heard()
 
     def heard(self):
