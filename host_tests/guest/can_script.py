@@ -29,6 +29,8 @@ REASONS = (
 )
 # Bits of MachineState from byte 3 on.
 FLAGS = ("arm", "control", "reset", "at_speed", "cutting", "rapid", "threading", "part_start")
+ERROR = 0x20000000  # flag of an error frame, linux/can/error.h
+ANY = "0:0,#FFFFFFFF"  # to candump: every frame, and every error frame
 STATE_CYCLE_S = 0.02
 SAMPLE_CYCLE_S = 0.001
 

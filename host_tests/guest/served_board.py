@@ -9,13 +9,16 @@ import pathlib
 import re
 import struct
 
-from can_script import STATES, Heard
+from can_script import OVERRIDE, STATES, Heard
 from guest import ROOT, Guest
 
 BUILD = pathlib.Path(os.environ.get("CUTFORCE_BUILD", ROOT / "build/aarch64"))
 IMAGE = ROOT / "toolchain/board/image"
 CHANGE = struct.Struct("<QII")
 STROBE, ALIVE, ALARM, INHIBIT = 8, 9, 10, 11
+# A sample a millisecond steps the supervisor, and the sender's clock is not the board's.
+TICK_S = 0.001
+QUIET_S = 0.21  # after which a missing acknowledge is believed; the link times out at 0.25 s
 LINES = f"""
 [gpio]
 chip = "cutforce-bench"
@@ -61,6 +64,20 @@ def programs(*names):
     return {
         f"/bin/{name}": BUILD / folders.get(name, "host_tests/guest") / name for name in names
     }
+
+
+def course(frames):
+    """The states of the Overrides, each as often as it was entered."""
+    states = []
+    for frame in frames:
+        if frame.identifier == OVERRIDE and (frame.state, frame.reason) not in states[-1:]:
+            states.append((frame.state, frame.reason))
+    return states
+
+
+def first_after(time_s, edges, level=1):
+    found = [edge_s for edge_s, edge_level in edges if edge_s >= time_s and edge_level == level]
+    return found[0] if found else float("inf")
 
 
 class ServedBoard(Guest):
