@@ -25,6 +25,8 @@ target_compile_definitions(cutforce_options INTERFACE
 if(CUTFORCE_SANITIZE)
   target_compile_options(cutforce_options INTERFACE
     -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+    # Lines for their reports; variables too would be a third of the compiler's time.
+    -g1
     # GCC takes what the sanitizers insert for reads of unset memory; the release build still warns.
     -Wno-maybe-uninitialized)
   target_compile_definitions(cutforce_options INTERFACE _GLIBCXX_ASSERTIONS)
