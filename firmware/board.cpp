@@ -72,12 +72,10 @@ void Board::complete(std::span<hal::Sample> samples, std::int64_t now_ns) noexce
 auto Board::step(std::span<const hal::Sample>& samples, std::int64_t now_ns) noexcept
     -> const LoopOutput* {
   loop_.permit(permission());
-  const std::optional<LoopOutput> output = loop_.step(samples);
-  if (!output) return nullptr;
+  if (!loop_.step(samples, own_.last)) return nullptr;
   own_.supervised_ns = std::max(own_.supervised_ns, now_ns);
-  note_wear(*output);
-  supervise(&*output);
-  own_.last = *output;
+  note_wear(own_.last);
+  supervise(&own_.last);
   own_.last.override_pct = static_cast<float>(supervision_.override_pct);
   own_.last.present |= LoopOutput::kOverride;
   return &own_.last;
@@ -226,7 +224,7 @@ bool Board::stopping(const BoardHealth& health) const noexcept {
 bool Board::may_speak() const noexcept {
   if (!supervision_.silent) return true;
   const bool down = own_.health.has_bus && is_down(own_.health.bus);
-  return supervision_.state == SupervisorState::kDead && !down && !report_.has_told(values());
+  return supervision_.state == SupervisorState::kDead && !down && !report_.has_told(headline());
 }
 
 auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> BoardOutput {
@@ -248,9 +246,6 @@ auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> Boa
   }
   own_.now_ns = now_ns;
 
-  BoardOutput out{};
-  out.supervision = supervision_;
-  if (may_speak()) out.frame = report_.due(now_ns, values());
   if (!supervision_.alive) {
     own_.alive = 0;
     own_.alive_ns = now_ns;
@@ -258,51 +253,12 @@ auto Board::tick(std::int64_t now_ns, const BoardHealth& health) noexcept -> Boa
     own_.alive ^= 1U;
     own_.alive_ns = now_ns;
   }
-  out.byte = {
-      .byte = byte(), .alive = own_.alive != 0, .alarm = supervision_.alarm, .again = false};
-  return out;
-}
-
-BoardValues Board::values() const noexcept {
-  const LoopOutput& last = own_.last;
-  const auto value = [&last](LoopOutput::Value which, float number) {
-    return (last.present & which) != 0 ? std::optional<float>{number} : std::nullopt;
-  };
-  const auto force_n = value(LoopOutput::kCuttingForce, last.cutting_force_n);
-  const auto gain = value(LoopOutput::kProcessGain, last.process_gain_n_pct);
-  const auto wear = gain && own_.first_gain_n_pct > 0.0F
-                        ? std::optional<float>{*gain / own_.first_gain_n_pct}
-                        : std::nullopt;
-  const auto state = static_cast<std::uint8_t>(supervision_.state);
-  const auto reason = static_cast<std::uint8_t>(supervision_.reason);
-  const float reference_n = permission().force_reference_n;
-  const float limit_n = force_limit_n();
-  return {
-      .override = {.override_pct = supervision_.override_pct,
-                   .state = state,
-                   .reason = reason,
-                   .force_n = force_n,
-                   .enabled =
-                       supervision_.controlling || supervision_.state >= SupervisorState::kLinkLost,
-                   .saturated_low = supervision_.controlling && last.saturated_low,
-                   .saturated_high = supervision_.controlling && last.saturated_high,
-                   .in_cut = last.state == LoopState::kCut,
-                   .source = static_cast<std::uint8_t>(last.source),
-                   .limit = limit_n > 0.0F && force_n.value_or(0.0F) > limit_n},
-      .estimate = {.force_n = force_n,
-                   .force_sigma_n = value(LoopOutput::kCuttingForce, last.cutting_force_sigma_n),
-                   .reference_n = reference_n > 0.0F ? reference_n : config_.force_reference_n,
-                   .power_w = value(LoopOutput::kAirGapPower, last.airgap_power_w),
-                   .stability_margin_ratio =
-                       value(LoopOutput::kStabilityMargin, last.stability_margin_ratio)},
-      .diagnostics = {.process_gain_n_pct = gain,
-                      .wear_ratio = wear,
-                      .worst_loop_us = own_.health.worst_loop_us,
-                      .refused_frames = link_.state().refused,
-                      .unsent_frames = own_.health.bus.unsent,
-                      .lost_samples = own_.lost_samples + assembler_.state().lost},
-      .state = state,
-      .reason = reason};
+  return {.frame = may_speak() ? frame(report_.due(now_ns, headline())) : std::nullopt,
+          .byte = {.byte = byte(),
+                   .alive = own_.alive != 0,
+                   .alarm = supervision_.alarm,
+                   .again = false},
+          .supervision = supervision_};
 }
 
 }  // namespace cutforce::firmware

@@ -160,7 +160,11 @@ class Board {
   [[nodiscard]] bool may_speak() const noexcept;
   [[nodiscard]] control::Permission permission() const noexcept;
   [[nodiscard]] float force_limit_n() const noexcept;
-  [[nodiscard]] BoardValues values() const noexcept;
+  [[nodiscard]] BoardReport::Headline headline() const noexcept;
+  [[nodiscard]] std::optional<hal::can::Frame> frame(BoardReport::Kind kind) const noexcept;
+  [[nodiscard]] hal::can::Override override_message() const noexcept;
+  [[nodiscard]] hal::can::Estimate estimate_message() const noexcept;
+  [[nodiscard]] hal::can::Diagnostics diagnostics_message() const noexcept;
 
   // What is left to read of the configuration once the parts are made.
   struct Settings {
@@ -196,8 +200,7 @@ constexpr Board::Board(const Config& config) noexcept
       loop_(ControlLoop::make_checked(config.loop)),
       supervisor_(*control::Supervisor::make(config.supervisor)),
       assembler_(*hal::can::SampleAssembler::make(config.assembler)),
-      link_(config.node),
-      report_(config.node) {
+      link_(config.node) {
   supervision_.override_pct = loop_.command().override_pct;
 }
 

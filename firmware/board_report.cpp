@@ -68,7 +68,7 @@ bool is_fault(std::uint32_t state) noexcept {
   return false;
 }
 
-std::uint8_t nmt_state(std::uint8_t state) noexcept {
+std::uint8_t nmt_state(std::uint32_t state) noexcept {
   constexpr std::uint8_t kBootUp = 0;
   constexpr std::uint8_t kStopped = 4;
   constexpr std::uint8_t kOperational = 5;
@@ -83,26 +83,8 @@ std::uint8_t nmt_state(std::uint8_t state) noexcept {
 std::uint32_t bit(BoardReport::Kind kind) noexcept { return 1U << static_cast<unsigned>(kind); }
 
 // Never 0 for a fault: kNone is no state of one.
-std::uint32_t emergency_of(std::uint32_t state, std::uint32_t reason) noexcept {
-  return is_fault(state) ? (state << 8U) + reason + 1U : 0U;
-}
-
-hal::can::Emergency emergency_message(const BoardValues& values) noexcept {
-  if (!is_fault(values.state)) {
-    return {.error_code = 0,
-            .error_register = 0,
-            .state = values.state,
-            .reason = values.reason,
-            .detail = 0};
-  }
-  const std::uint16_t code = error_code(static_cast<Reason>(values.reason));
-  const bool link = code == kHeartbeatError || code == kBusPassive || code == kMonitoring;
-  return {.error_code = code,
-          .error_register = static_cast<std::uint8_t>(
-              link ? kRegisterGeneric | kRegisterCommunication : kRegisterGeneric),
-          .state = values.state,
-          .reason = values.reason,
-          .detail = 0};
+std::uint32_t emergency_of(const BoardReport::Headline& headline) noexcept {
+  return is_fault(headline.state) ? (headline.state << 8U) + headline.reason + 1U : 0U;
 }
 
 // On the schedule's grid, unless it is a whole cycle late.
@@ -118,13 +100,11 @@ bool BoardReport::is_due(Kind kind, std::int64_t now_ns, std::int64_t last_ns,
   return (state_.started & bit(kind)) == 0 || now_ns - last_ns >= cycle_ns;
 }
 
-auto BoardReport::most_urgent(std::int64_t now_ns, const BoardValues& values) const noexcept
+auto BoardReport::most_urgent(std::int64_t now_ns, const Headline& headline) const noexcept
     -> Kind {
-  if (emergency_of(values.state, values.reason) != state_.emergency) return Kind::kEmergency;
-  const bool changed = values.override.override_pct.value_or(0xFF) != state_.last_override_pct ||
-                       values.state != state_.last_state || values.reason != state_.last_reason;
+  if (emergency_of(headline) != state_.emergency) return Kind::kEmergency;
   if (is_due(Kind::kOverride, now_ns, state_.override_ns,
-             changed ? kOverrideLeastGap_ns : kOverrideCycle_ns))
+             headline == state_.told ? kOverrideCycle_ns : kOverrideLeastGap_ns))
     return Kind::kOverride;
   if (is_due(Kind::kHeartbeat, now_ns, state_.heartbeat_ns, kHeartbeatCycle_ns))
     return Kind::kHeartbeat;
@@ -135,35 +115,16 @@ auto BoardReport::most_urgent(std::int64_t now_ns, const BoardValues& values) co
   return Kind::kNone;
 }
 
-auto BoardReport::due(std::int64_t now_ns, const BoardValues& values) noexcept
-    -> std::optional<hal::can::Frame> {
-  const Kind kind = most_urgent(now_ns, values);
+auto BoardReport::due(std::int64_t now_ns, const Headline& headline) noexcept -> Kind {
+  const Kind kind = most_urgent(now_ns, headline);
   state_.offered = static_cast<std::uint32_t>(kind);
   state_.offered_ns = now_ns;
-  state_.offered_state = values.state;
-  state_.offered_reason = values.reason;
-  state_.offered_override_pct = values.override.override_pct.value_or(0xFF);
-  switch (kind) {
-    case Kind::kNone:
-      break;
-    case Kind::kEmergency:
-      return pack(emergency_message(values), node_);
-    case Kind::kOverride:
-      return pack(values.override, node_, static_cast<std::uint8_t>(state_.counter));
-    case Kind::kHeartbeat:
-      return pack(hal::can::Heartbeat{.nmt_state = nmt_state(values.state)}, node_);
-    case Kind::kEstimate:
-      return pack(values.estimate, node_);
-    case Kind::kDiagnostics:
-      return pack(values.diagnostics, node_);
-  }
-  return std::nullopt;
+  state_.offered_headline = headline;
+  return kind;
 }
 
-bool BoardReport::has_told(const BoardValues& values) const noexcept {
-  return emergency_of(values.state, values.reason) == state_.emergency &&
-         values.override.override_pct.value_or(0xFF) == state_.last_override_pct &&
-         values.state == state_.last_state && values.reason == state_.last_reason;
+bool BoardReport::has_told(const Headline& headline) const noexcept {
+  return emergency_of(headline) == state_.emergency && headline == state_.told;
 }
 
 void BoardReport::sent() noexcept {
@@ -177,14 +138,12 @@ void BoardReport::sent() noexcept {
     case Kind::kNone:
       break;
     case Kind::kEmergency:
-      state_.emergency = emergency_of(state_.offered_state, state_.offered_reason);
+      state_.emergency = emergency_of(state_.offered_headline);
       break;
     case Kind::kOverride:
       ++state_.counter;
       state_.override_ns = now_ns;
-      state_.last_override_pct = state_.offered_override_pct;
-      state_.last_state = state_.offered_state;
-      state_.last_reason = state_.offered_reason;
+      state_.told = state_.offered_headline;
       break;
     case Kind::kHeartbeat:
       follow(state_.heartbeat_ns, kHeartbeatCycle_ns);
@@ -198,6 +157,26 @@ void BoardReport::sent() noexcept {
   }
   state_.started |= bit(kind);
   state_.offered = 0;
+}
+
+hal::can::Emergency emergency_message(const BoardReport::Headline& headline) noexcept {
+  hal::can::Emergency message{.error_code = 0,
+                              .error_register = 0,
+                              .state = static_cast<std::uint8_t>(headline.state),
+                              .reason = static_cast<std::uint8_t>(headline.reason),
+                              .detail = 0};
+  if (!is_fault(headline.state)) return message;
+  message.error_code = error_code(static_cast<Reason>(headline.reason));
+  message.error_register = kRegisterGeneric;
+  if (message.error_code == kHeartbeatError || message.error_code == kBusPassive ||
+      message.error_code == kMonitoring) {
+    message.error_register |= kRegisterCommunication;
+  }
+  return message;
+}
+
+hal::can::Heartbeat heartbeat_message(const BoardReport::Headline& headline) noexcept {
+  return {.nmt_state = nmt_state(headline.state)};
 }
 
 }  // namespace cutforce::firmware

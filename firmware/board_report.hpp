@@ -1,24 +1,15 @@
-// What the board says on the bus, and when: each frame at its cycle, Override also at once when it
-// changes, Emergency when a fault comes or goes. One frame at a time, the most urgent that is due,
-// made from the newest values; one that could not be handed over is made anew the next time. So
-// nothing queues, and no frame is older than a tick.
+// When the board says what on the bus: each frame at its cycle, Override also at once when it
+// changes, Emergency when a fault comes or goes. One frame at a time, the most urgent that is due;
+// one that could not be handed over is due anew the next time, with the newest values. So nothing
+// queues, and no frame is older than a tick.
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <type_traits>
 
 #include "hal/can/messages.hpp"
 
 namespace cutforce::firmware {
-
-struct BoardValues {
-  hal::can::Override override;
-  hal::can::Estimate estimate;
-  hal::can::Diagnostics diagnostics;
-  std::uint8_t state;   // control::SupervisorState
-  std::uint8_t reason;  // control::Reason
-};
 
 class BoardReport {
  public:
@@ -38,45 +29,54 @@ class BoardReport {
     kDiagnostics
   };
 
+  // What does not wait for a cycle.
+  struct Headline {
+    std::uint32_t override_pct;  // 0xFF: none
+    std::uint32_t state;         // control::SupervisorState
+    std::uint32_t reason;        // control::Reason
+
+    friend constexpr bool operator==(const Headline&, const Headline&) noexcept = default;
+  };
+
   struct State {
     std::int64_t override_ns;
     std::int64_t estimate_ns;
     std::int64_t diagnostics_ns;
     std::int64_t heartbeat_ns;
     std::int64_t offered_ns;
-    std::uint32_t started;  // bits of Kind: one was sent
-    std::uint32_t counter;  // of the guard
-    std::uint32_t last_override_pct;
-    std::uint32_t last_state;
-    std::uint32_t last_reason;
+    std::uint32_t started;    // bits of Kind: one was sent
+    std::uint32_t counter;    // of the guard
     std::uint32_t emergency;  // state and reason of the last one; 0: none, or taken back
-    std::uint32_t offered;    // Kind of the frame that due() made last
-    std::uint32_t offered_override_pct;
-    std::uint32_t offered_state;
-    std::uint32_t offered_reason;
+    std::uint32_t offered;    // Kind that due() named last
+    Headline told;            // by the last Override
+    Headline offered_headline;
   };
 
-  explicit constexpr BoardReport(std::uint8_t node) noexcept : node_(node) {}
-
-  // The frame to send now, if one is due. `now_ns` does not go back.
-  [[nodiscard]] std::optional<hal::can::Frame> due(std::int64_t now_ns,
-                                                   const BoardValues& values) noexcept;
-  // The frame that due() made last is on its way.
+  // What to send now. `now_ns` does not go back.
+  [[nodiscard]] Kind due(std::int64_t now_ns, const Headline& headline) noexcept;
+  // The frame that due() named last is on its way.
   void sent() noexcept;
-  // Whether the last Override and the last Emergency say this state and what goes out in it.
-  [[nodiscard]] bool has_told(const BoardValues& values) const noexcept;
+  // Whether the last Override and the last Emergency say it.
+  [[nodiscard]] bool has_told(const Headline& headline) const noexcept;
+  // Of the next Override.
+  [[nodiscard]] std::uint8_t counter() const noexcept {
+    return static_cast<std::uint8_t>(state_.counter);
+  }
 
   [[nodiscard]] const State& state() const noexcept { return state_; }
   void restore(const State& state) noexcept { state_ = state; }
 
  private:
-  [[nodiscard]] Kind most_urgent(std::int64_t now_ns, const BoardValues& values) const noexcept;
+  [[nodiscard]] Kind most_urgent(std::int64_t now_ns, const Headline& headline) const noexcept;
   [[nodiscard]] bool is_due(Kind kind, std::int64_t now_ns, std::int64_t last_ns,
                             std::int64_t cycle_ns) const noexcept;
 
-  std::uint8_t node_;
   State state_{};
 };
 static_assert(std::is_trivially_copyable_v<BoardReport>);
+
+// The messages that say no more than the headline.
+[[nodiscard]] hal::can::Emergency emergency_message(const BoardReport::Headline& headline) noexcept;
+[[nodiscard]] hal::can::Heartbeat heartbeat_message(const BoardReport::Headline& headline) noexcept;
 
 }  // namespace cutforce::firmware

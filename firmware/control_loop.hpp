@@ -133,9 +133,13 @@ class ControlLoop {
   }
 
   // Raw samples from the front of `samples`, until one ends an estimate period or there are no
-  // more; those that were taken are no longer in it. An output with the sample that ends a period.
-  // What comes out is the same however the samples are cut into spans.
-  [[nodiscard]] std::optional<LoopOutput> step(std::span<const hal::Sample>& samples) noexcept;
+  // more; those that were taken are no longer in it. True with the sample that ends a period: `row`
+  // says what came out, else it stays as it was. That is the same however the samples are cut.
+  [[nodiscard]] bool step(std::span<const hal::Sample>& samples, LoopOutput& row) noexcept;
+  [[nodiscard]] std::optional<LoopOutput> step(std::span<const hal::Sample>& samples) noexcept {
+    LoopOutput row{};
+    return step(samples, row) ? std::optional{row} : std::nullopt;
+  }
   // One of them.
   [[nodiscard]] std::optional<LoopOutput> step(const hal::Sample& sample) noexcept {
     std::span<const hal::Sample> one(&sample, 1);
@@ -184,7 +188,7 @@ class ControlLoop {
   void calibrate(const estimator::FusedObserver::Output& fused) noexcept;
   void apply_calibration(const estimator::IdleCalibration::Result& result) noexcept;
   void watch_health(LoopOutput& out) noexcept;
-  [[nodiscard]] LoopOutput close_estimate() noexcept;
+  void close_estimate(LoopOutput& out) noexcept;
   void estimate_fused(LoopOutput& out) noexcept;
   void estimate_path(LoopOutput& out) const noexcept;
   [[nodiscard]] float path_frequency_rad_s() const noexcept;
@@ -241,10 +245,10 @@ template <hal::Port P, class Sink>
     if (!count) return std::unexpected{count.error()};
     if (*count == 0) return {};
     for (std::span<const hal::Sample> rest = block.first(*count); !rest.empty();) {
-      const std::optional<LoopOutput> out = loop.step(rest);
-      if (!out) continue;
-      sink(*out);
-      if (!out->control_tick) continue;
+      LoopOutput row{};
+      if (!loop.step(rest, row)) continue;
+      sink(row);
+      if (!row.control_tick) continue;
       if (const auto sent = port.write(loop.command()); !sent) {
         return std::unexpected{sent.error()};
       }

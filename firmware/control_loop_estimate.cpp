@@ -209,8 +209,7 @@ void ControlLoop::add_force(LoopOutput& out) noexcept {
   out.present |= LoopOutput::kCuttingForce;
 }
 
-auto ControlLoop::close_estimate() noexcept -> LoopOutput {
-  LoopOutput out;
+void ControlLoop::close_estimate(LoopOutput& out) noexcept {
   clear(out, time_ns());
   ++own_.estimates;
   const bool control = own_.estimates >= config_.estimates_per_control;
@@ -258,6 +257,6 @@ auto ControlLoop::close_estimate() noexcept -> LoopOutput {
   }
   publish_control(out);
   own_.published = out.faults;
-  return out;
 }
+
 }  // namespace cutforce::firmware

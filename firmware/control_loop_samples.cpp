@@ -11,8 +11,7 @@ using hal::Signal;
 
 }  // namespace
 
-auto ControlLoop::step(std::span<const hal::Sample>& samples) noexcept
-    -> std::optional<LoopOutput> {
+bool ControlLoop::step(std::span<const hal::Sample>& samples, LoopOutput& row) noexcept {
   while (!samples.empty()) {
     std::size_t taken = step_run(samples);
     if (taken == 0) {
@@ -22,9 +21,10 @@ auto ControlLoop::step(std::span<const hal::Sample>& samples) noexcept
     samples = samples.subspan(taken);
     if (own_.elapsed_periods < config_.close_at_periods) continue;
     own_.elapsed_periods = 0.0F;
-    return close_estimate();
+    close_estimate(row);
+    return true;
   }
-  return std::nullopt;
+  return false;
 }
 
 // To the end of the estimate window, and of the path's.

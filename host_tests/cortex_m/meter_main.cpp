@@ -200,10 +200,10 @@ bool count_loop(Meter& meter, std::string_view stream, const LoopNames& names) {
         auto before = block.first(kSamplesPerTick - 1);
         bool closed = false;
         bool controlled = false;
+        firmware::LoopOutput row{};
         const auto step = [&](std::span<const hal::Sample>& samples) {
-          const auto output = made->step(samples);
-          closed = output.has_value();
-          controlled = closed && output->control_tick;
+          closed = made->step(samples, row);
+          controlled = closed && row.control_tick;
         };
         const std::uint32_t a = meter.count([&] { step(before); });
         const std::uint32_t b = meter.count([&] { step(last); });
