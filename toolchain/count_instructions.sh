@@ -39,7 +39,7 @@ instructions() {
 mapfile -t names < <("$program" --list)
 (($#)) || set -- "${names[@]}"
 for name in "$@"; do
-  printf '%s\n' "${names[@]}" | grep -qxF -- "$name" || {
+  [[ " ${names[*]} " == *" $name "* ]] || {
     echo "no body is named $name; there are: ${names[*]}" >&2
     exit 2
   }

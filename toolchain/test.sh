@@ -63,7 +63,7 @@ run_tests() {
   count "$preset" "$junit"
   skipped_tests "$junit"
   if ((failed > failed_before || status != 0)); then
-    sed -n '/The following tests FAILED/,$p' "$results" | grep -v -e '(Skipped)$' -e '^Errors while'
+    sed -n '/The following tests FAILED/,$p' "$results" | grep -v -e '(Skipped)$' -e '^Errors while' || true
     grep -A 4 -e ': Failure$' -e 'ERROR: AddressSanitizer' -e 'runtime error:' "$results" |
       head -n 60 || true
     # What the tests in Python say: from the name to the exception.

@@ -1,5 +1,7 @@
 """What the service makes of a bus that fails, lies, babbles or falls silent, behind a controller;
-board_serial_test.py has it behind a serial adapter."""
+board_serial_test.py has it behind a serial adapter.
+
+CUTFORCE_LONG=1: each bit of a frame is flipped, else 24 of the 64."""
 
 import os
 import random
