@@ -41,6 +41,22 @@ inline constexpr auto kControlRules = std::to_array<MachineRule>({
      },
      "no CNC understands this step",
      "give 1 or 10"},
+    {{"override_initial_pct", "override_step_pct"},
+     [](const Machine& m) noexcept {
+       const auto percent = static_cast<std::uint32_t>(m.override_initial_pct);
+       return !(static_cast<float>(percent) < m.override_initial_pct) &&
+              percent % static_cast<std::uint32_t>(m.override_step_pct) == 0;
+     },
+     "the CNC cannot be told the first override",
+     "give a multiple of override_step_pct"},
+    {{"override_ceiling_pct", "override_code"},
+     [](const Machine& m) noexcept {
+       return (m.override_code != OverrideCode::kSiemensGray &&
+               m.override_code != OverrideCode::kSiemensBinary) ||
+              m.override_ceiling_pct <= 200.0F;
+     },
+     "the codes of Siemens end at 200 %",
+     "set override_ceiling_pct = 200 or less"},
     {{"override_code", "override_step_pct", "override_ceiling_pct"},
      [](const Machine& m) noexcept {
        return m.override_code != OverrideCode::kFanucOv10 ||
