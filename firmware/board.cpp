@@ -5,7 +5,6 @@
 namespace cutforce::firmware {
 namespace {
 
-using control::Supervisor;
 using control::SupervisorState;
 using hal::can::Base;
 using hal::can::identifier;

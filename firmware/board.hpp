@@ -99,7 +99,7 @@ class Board {
     if (samples.empty()) return;
     complete(samples, now_ns);
     for (std::span<const hal::Sample> rest = samples; !rest.empty();) {
-      if (const auto row = step(rest, now_ns)) sink(*row);
+      if (const auto* row = step(rest, now_ns)) sink(*row);
     }
   }
   // After all that has come since the last tick. `now_ns` does not go back.
