@@ -22,6 +22,12 @@ using hal::host::Complex;
 using hal::host::SimulatedMachine;
 using hal::host::SimulatedMachineConfig;
 
+SimulatedMachineConfig loaded_motor_a() {
+  SimulatedMachineConfig config = hal::host::motor_a();
+  config.load.torque_nm = hal::host::ramped_steps(0.0, {{1.0, 5.84}, {1.6, 0.0}}, 0.03);
+  return config;
+}
+
 std::vector<Row> run_open_loop(const SimulatedMachineConfig& config, double duration_s) {
   auto machine = SimulatedMachine::make(config);
   if (!machine) give_up(machine.error().text());

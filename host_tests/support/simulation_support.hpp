@@ -11,6 +11,9 @@
 
 namespace cutforce::host_tests {
 
+// Motor A up to speed, loaded with 40 % of its rated torque from 1 s to 1.6 s.
+[[nodiscard]] hal::host::SimulatedMachineConfig loaded_motor_a();
+
 // One delivered sample and what was true at that instant.
 struct Row {
   hal::Sample sample;
