@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <new>
 #include <span>
 #include <string_view>
 
@@ -18,6 +17,7 @@
 #include "hal/cortex_m/stream_port.hpp"
 #include "host_tests/benchmarks/control_tick_body.hpp"
 #include "host_tests/benchmarks/target_bodies.hpp"
+#include "host_tests/cortex_m/counting.hpp"
 
 namespace cutforce::benchmarks {
 namespace {
@@ -31,44 +31,6 @@ using hal::cortex_m::StreamPort;
 constinit std::array<char, 512> line{};
 constinit firmware::Machine machine{};
 
-class Counts {
- public:
-  void add(std::uint32_t count) noexcept {
-    sum_ += count;
-    most_ = count > most_ ? count : most_;
-    ++calls_;
-  }
-  // A call, or one of `parts` that it has.
-  void show(std::string_view name, std::uint32_t parts = 1) const noexcept {
-    if (calls_ == 0) return;
-    const std::uint32_t all = calls_ * parts;
-    console::write(name);
-    console::write(" ");
-    console::write_number(static_cast<std::uint32_t>((sum_ + all / 2) / all));
-    console::write(" ");
-    console::write_number((most_ + parts - 1) / parts);
-    console::write("\n");
-  }
-
- private:
-  std::uint64_t sum_ = 0;
-  std::uint32_t most_ = 0;
-  std::uint32_t calls_ = 0;
-};
-
-// What is too large for a stack, one after the other in one place.
-template <class T>
-class Place {
- public:
-  template <class... Arguments>
-  T& make(Arguments&&... arguments) noexcept {
-    return *new (bytes_.data()) T(static_cast<Arguments&&>(arguments)...);
-  }
-
- private:
-  alignas(T) std::array<std::byte, sizeof(T)> bytes_{};
-};
-
 void show_calibration(Meter& meter) {
   Counts empty;
   Counts nops;
@@ -78,30 +40,6 @@ void show_calibration(Meter& meter) {
   }
   empty.show("empty");
   nops.show("nop_100");
-}
-
-// Seconds of the stream that are run in and not counted, and that are.
-constexpr std::uint32_t kRunIn = 15'000;
-constexpr std::uint32_t kCounted = 20'000;
-
-// The stream's first sample alone, then blocks that each end with an estimate period.
-template <class First, class Step>
-bool over_stream(std::string_view name, const First& first, const Step& step) {
-  auto port = StreamPort::open(name, std::as_writable_bytes(std::span(&machine, 1)));
-  if (!port) return false;
-  std::array<hal::Sample, kSamplesPerTick> block{};
-  const auto read = [&port](hal::Sample& sample) {
-    const auto count = port->read(std::span(&sample, 1));
-    return count && *count == 1;
-  };
-  if (!read(block[0])) return false;
-  first(block[0]);
-  for (std::uint32_t k = 0; k < kRunIn + kCounted; k += kSamplesPerTick) {
-    for (hal::Sample& sample : block)
-      if (!read(sample)) return false;
-    step(std::span<const hal::Sample>(block), k >= kRunIn);
-  }
-  return true;
 }
 
 bool count_samples(Meter& meter, std::string_view stream, const ControlLoop::Config& config) {
@@ -114,7 +52,7 @@ bool count_samples(Meter& meter, std::string_view stream, const ControlLoop::Con
   Counts tick;
   const auto start = [&](const hal::Sample& s) { air_gap.start(s), fused.start(s); };
   const bool read =
-      over_stream(stream, start, [&](std::span<const hal::Sample> block, bool counted) {
+      over_stream(stream, machine, start, [&](std::span<const hal::Sample> block, bool counted) {
         const std::uint32_t a = meter.count([&] { air_gap.step(block); });
         const std::uint32_t b = meter.count([&] { fused.step(block); });
         const std::uint32_t c = meter.count([&] { fused.tick(); });
@@ -157,7 +95,7 @@ bool count_control_tick(Meter& meter, std::string_view stream) {
     for (std::size_t k = 0; k < part.size(); ++k) part[k].add(used[k]);
   };
   const bool read = over_stream(
-      stream, [&](const hal::Sample& sample) { step(sample, false); },
+      stream, machine, [&](const hal::Sample& sample) { step(sample, false); },
       [&](std::span<const hal::Sample> block, bool counted) {
         for (const hal::Sample& sample : block) step(sample, counted);
       });
@@ -195,7 +133,7 @@ bool count_loop(Meter& meter, std::string_view stream, const LoopNames& names) {
   Counts control;
   const auto start = [&](const hal::Sample& s) { static_cast<void>(made->step(s)); };
   const bool read =
-      over_stream(stream, start, [&](std::span<const hal::Sample> block, bool counted) {
+      over_stream(stream, machine, start, [&](std::span<const hal::Sample> block, bool counted) {
         auto last = block.last(1);
         auto before = block.first(kSamplesPerTick - 1);
         bool closed = false;
@@ -240,7 +178,7 @@ bool count_board(Meter& meter, std::string_view stream) {
     board.samples({&first, 1}, now_ns, sink);
   };
   const bool read =
-      over_stream(stream, start, [&](std::span<const hal::Sample> block, bool counted) {
+      over_stream(stream, machine, start, [&](std::span<const hal::Sample> block, bool counted) {
         now_ns += 1'000'000;
         std::array<hal::Sample, kSamplesPerTick> half{};
         std::ranges::copy(block, half.begin());
