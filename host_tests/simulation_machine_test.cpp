@@ -7,11 +7,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <string>
 
 #include "hal/host/simulation/arithmetic.hpp"
+#include "support/scratch_folder.hpp"
 #include "support/simulation_support.hpp"
 
 namespace cutforce {
@@ -150,7 +150,8 @@ TEST(SimulatedMachine, DrawsItsRatedCurrentAndSlipAtItsRatedTorque) {
 }
 
 TEST(SimulatedMachine, WritesRecordings) {
-  const auto path = std::filesystem::temp_directory_path() / "cutforce_simulated_recording.csv";
+  const host_tests::ScratchFolder folder;
+  const auto path = folder.file("simulated.csv");
   host_tests::write_recording(default_lathe(), 0.01, path);
   std::ifstream file(path);
   std::string line;
@@ -159,7 +160,6 @@ TEST(SimulatedMachine, WritesRecordings) {
   int rows = 0;
   while (std::getline(file, line)) rows += line[0] >= '0' && line[0] <= '9';
   EXPECT_EQ(rows, 51);
-  std::filesystem::remove(path);
 }
 
 TEST(SimulatedMachine, ShowsNoTruthInItsSamples) {
